@@ -1,0 +1,5 @@
+//! Any exchange with any bytes as answers.
+
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| busbar_fuzz::client(bytes));

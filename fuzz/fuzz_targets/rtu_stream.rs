@@ -1,0 +1,5 @@
+//! Any bytes from a serial line, in any pieces, to a server.
+
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| busbar_fuzz::rtu_stream(bytes));
