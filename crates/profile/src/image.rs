@@ -1,0 +1,234 @@
+//! The registers of one device, as far as they have been read, and which points a read has changed.
+
+use crate::point::Point;
+use crate::profile::Profile;
+
+/// The registers of one device over its readable ranges.
+///
+/// A client stores answers in it; an imitated device serves reads out of it.
+#[derive(Clone, Debug)]
+pub struct Image {
+    spans: Vec<Span>,
+    registers: Vec<u16>,
+    known: Vec<bool>,
+    /// Points over register `i` are `points[starts[i]..starts[i + 1]]`.
+    starts: Vec<u32>,
+    points: Vec<u32>,
+    /// First register and length of each point, by its index in the profile; length 0 where it cannot be read.
+    places: Vec<(u32, u32)>,
+}
+
+/// A readable range and where it begins among the registers.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    first: u16,
+    last: u16,
+    base: usize,
+}
+
+impl Image {
+    /// An image of which nothing has been read yet.
+    pub fn new(profile: &Profile) -> Self {
+        let mut spans = Vec::with_capacity(profile.wire.readable.len());
+        let mut len = 0;
+        for &(first, last) in &profile.wire.readable {
+            spans.push(Span { first, last, base: len });
+            len += usize::from(last - first) + 1;
+        }
+        let mut image = Self {
+            spans,
+            registers: vec![0; len],
+            known: vec![false; len],
+            starts: Vec::with_capacity(len + 1),
+            points: Vec::new(),
+            places: Vec::new(),
+        };
+        image.index(&profile.points);
+        image
+    }
+
+    /// An image in which every register is known and 0: what an imitated device starts from.
+    pub fn zeroed(profile: &Profile) -> Self {
+        let mut image = Self::new(profile);
+        image.known.fill(true);
+        image
+    }
+
+    fn index(&mut self, points: &[Point]) {
+        let mut over = vec![Vec::new(); self.registers.len()];
+        for (index, point) in points.iter().enumerate() {
+            let place = match self.position(point.address, usize::from(point.registers)) {
+                Some(start) if point.access.is_readable() => (start, usize::from(point.registers)),
+                _ => (0, 0),
+            };
+            for list in &mut over[place.0..place.0 + place.1] {
+                list.push(index as u32);
+            }
+            self.places.push((place.0 as u32, place.1 as u32));
+        }
+        for list in over {
+            self.starts.push(self.points.len() as u32);
+            self.points.extend(list);
+        }
+        self.starts.push(self.points.len() as u32);
+    }
+
+    /// Takes over the registers of an answer, and appends to `changed` the index of each point that is now wholly known
+    /// and differs from before, in address order and each once.
+    ///
+    /// Registers outside the readable ranges are ignored.
+    pub fn store(&mut self, address: u16, registers: &[u16], changed: &mut Vec<usize>) {
+        let already = changed.len();
+        let end = usize::from(address) + registers.len();
+        for span in &self.spans {
+            let (first, last) = (usize::from(span.first), usize::from(span.last));
+            let from = usize::from(address).max(first);
+            let to = end.min(last + 1);
+            if from >= to {
+                continue;
+            }
+            let window = &registers[from - usize::from(address)..to - usize::from(address)];
+            let base = span.base + from - first;
+            let range = base..base + window.len();
+            if self.registers[range.clone()] == *window && !self.known[range].contains(&false) {
+                continue;
+            }
+            for (slot, &register) in (base..).zip(window) {
+                if self.known[slot] && self.registers[slot] == register {
+                    continue;
+                }
+                self.registers[slot] = register;
+                self.known[slot] = true;
+                for &point in &self.points[self.starts[slot] as usize..self.starts[slot + 1] as usize] {
+                    changed.push(point as usize);
+                }
+            }
+        }
+        // Few points stand over one register, so what repeats is close together once sorted.
+        changed[already..].sort_unstable();
+        let mut kept = already;
+        for read in already..changed.len() {
+            let point = changed[read];
+            let is_new = kept == already || changed[kept - 1] != point;
+            if is_new && self.is_known(point) {
+                changed[kept] = point;
+                kept += 1;
+            }
+        }
+        changed.truncate(kept);
+    }
+
+    /// The registers of the point of that index in the profile; none until all of them have been read.
+    pub fn registers(&self, point: usize) -> Option<&[u16]> {
+        if !self.is_known(point) {
+            return None;
+        }
+        let &(start, len) = self.places.get(point)?;
+        self.registers.get(start as usize..(start + len) as usize)
+    }
+
+    /// The registers of a point to write into; they are known from then on. None for a point that cannot be read.
+    pub fn registers_mut(&mut self, point: usize) -> Option<&mut [u16]> {
+        let &(start, len) = self.places.get(point)?;
+        if len == 0 {
+            return None;
+        }
+        let range = start as usize..(start + len) as usize;
+        self.known[range.clone()].fill(true);
+        self.registers.get_mut(range)
+    }
+
+    /// The registers of a window; none if it leaves the readable ranges or holds a register that is not known.
+    pub fn window(&self, address: u16, count: u16) -> Option<&[u16]> {
+        let start = self.position(address, usize::from(count))?;
+        let range = start..start + usize::from(count);
+        if self.known[range.clone()].contains(&false) {
+            return None;
+        }
+        self.registers.get(range)
+    }
+
+    /// Forgets everything, as after a change of the device.
+    pub fn clear(&mut self) {
+        self.known.fill(false);
+    }
+
+    fn is_known(&self, point: usize) -> bool {
+        self.places.get(point).is_some_and(|&(start, len)| {
+            len > 0 && !self.known[start as usize..(start + len) as usize].contains(&false)
+        })
+    }
+
+    /// Where a window begins; none if it is empty or not inside one range.
+    fn position(&self, address: u16, count: usize) -> Option<usize> {
+        let after = self.spans.partition_point(|span| span.first <= address);
+        let span = self.spans[..after].last()?;
+        let end = usize::from(address) + count;
+        if count == 0 || end > usize::from(span.last) + 1 {
+            return None;
+        }
+        Some(span.base + usize::from(address - span.first))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> Profile {
+        let text = include_str!("../tests/sound.toml");
+        Profile::parse("sound.toml", text).unwrap_or_else(|findings| panic!("{findings}"))
+    }
+
+    fn store(image: &mut Image, profile: &Profile, address: u16, registers: &[u16]) -> Vec<String> {
+        let mut changed = Vec::new();
+        image.store(address, registers, &mut changed);
+        changed.into_iter().map(|index| profile.points[index].id.clone()).collect()
+    }
+
+    #[test]
+    fn tells_which_points_changed() {
+        let profile = sample();
+        let mut image = Image::new(&profile);
+        assert_eq!(store(&mut image, &profile, 0, &[2302, 7]), ["voltage"], "power is known by half");
+        assert_eq!(store(&mut image, &profile, 0, &[2302, 7, 0, 45]), ["power", "oil_pressure"]);
+        assert_eq!(store(&mut image, &profile, 0, &[2302, 8, 0, 45]), ["power"]);
+        assert_eq!(store(&mut image, &profile, 0, &[2302, 8, 0, 45]), [""; 0]);
+        assert_eq!(store(&mut image, &profile, 5, &[0x0102]), ["brand", "model"]);
+    }
+
+    #[test]
+    fn keeps_what_was_read() {
+        let profile = sample();
+        let mut image = Image::new(&profile);
+        let power = profile.point_index("power").unwrap();
+        assert_eq!(image.registers(power), None);
+        assert_eq!(image.window(0, 2), None);
+        store(&mut image, &profile, 1, &[7, 1]);
+        assert_eq!(image.registers(power), Some(&[7, 1][..]));
+        assert_eq!(image.window(1, 2), Some(&[7, 1][..]));
+        image.registers_mut(power).unwrap()[0] = 9;
+        assert_eq!(image.window(1, 1), Some(&[9][..]));
+        image.clear();
+        assert_eq!(image.registers(power), None);
+    }
+
+    #[test]
+    fn never_leaves_the_map() {
+        let profile = sample();
+        let mut image = Image::zeroed(&profile);
+        assert_eq!(image.window(198, 3), Some(&[0; 3][..]));
+        assert_eq!(image.window(198, 4), None);
+        assert_eq!(image.window(250, 1), None);
+        assert_eq!(image.window(0, 0), None);
+        assert_eq!(image.window(65535, 2), None);
+        // 300 to 511 and 512 to 1100 are one range.
+        assert_eq!(image.window(500, 20).map(<[u16]>::len), Some(20));
+        let changed = store(&mut image, &profile, 199, &[1; 500]);
+        assert_eq!(changed, ["scope", "lcd"]);
+        assert_eq!(store(&mut image, &profile, 65535, &[1, 2]), [""; 0]);
+        let keys = profile.point_index("keys").unwrap();
+        assert!(image.registers(keys).is_none() && image.registers_mut(keys).is_none());
+        assert!(image.registers(usize::MAX).is_none());
+    }
+}
