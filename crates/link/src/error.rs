@@ -1,0 +1,285 @@
+//! What can go wrong on a wire, who is at fault, and what to do about it.
+
+use std::io;
+use std::sync::Arc;
+use std::time::Duration;
+
+use busbar_modbus::{ExceptionCode, StartError};
+use thiserror::Error;
+
+use crate::endpoint::Endpoint;
+
+/// Why a request has no result.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// The device refused: it is alive, but will not do this.
+    #[error("unit {unit} answered function {function} with exception {code}")]
+    Exception {
+        /// Unit id asked.
+        unit: u8,
+        /// Function asked, without the exception bit.
+        function: u8,
+        /// The code, as the device sent it.
+        code: ExceptionCode,
+    },
+    /// No answer to a read, however often it was asked. The usual cause: a wrong unit id, or the
+    /// device is off.
+    #[error(
+        "unit {unit} did not answer within {after:?}, asked {tries} times: check the unit id and that the device is on"
+    )]
+    Timeout {
+        /// Unit id asked.
+        unit: u8,
+        /// How long each try waited.
+        after: Duration,
+        /// How often the request was sent.
+        tries: u8,
+    },
+    /// There is no connection. A write that ends so was not sent.
+    #[error("{reason}")]
+    Down {
+        /// Why not.
+        reason: Outage,
+    },
+    /// A write left and its answer never came: it may have taken effect or not. Find out by
+    /// reading; never send it again.
+    #[error(
+        "the answer to a write to unit {unit} was lost ({loss}); it may have taken effect: read the state before anything else"
+    )]
+    Lost {
+        /// Unit id written to.
+        unit: u8,
+        /// What became of the answer.
+        loss: Loss,
+    },
+    /// More requests wait than the wire takes. The caller asks faster than the wire can answer.
+    #[error("{waiting} requests wait for this wire already: ask less often")]
+    QueueFull {
+        /// How many wait in the same class of priority.
+        waiting: usize,
+    },
+    /// Only functions 3 and 4 read registers.
+    #[error("function {function} does not read registers: use 3 (holding) or 4 (input)")]
+    NotARead {
+        /// The function the caller gave.
+        function: u8,
+    },
+    /// The protocol has no frame for this request, for example because of its count; nothing was sent.
+    #[error("not sent: {0}")]
+    NotSent(#[from] StartError),
+    /// The wire's task has ended; nothing was sent.
+    #[error("this wire has been closed")]
+    Closed,
+}
+
+impl LinkError {
+    /// Whose fault it is, for a first guess at where to look.
+    pub fn fault(&self) -> Fault {
+        match self {
+            Self::Exception { .. } => Fault::Device,
+            Self::Timeout { .. } | Self::Lost { .. } => Fault::Wire,
+            Self::Down { reason } => match reason.cause {
+                Cause::Garbage | Cause::Closed => Fault::Peer,
+                _ => Fault::Wire,
+            },
+            Self::QueueFull { .. } | Self::NotARead { .. } | Self::NotSent(_) => Fault::Caller,
+            Self::Closed => Fault::Us,
+        }
+    }
+}
+
+/// Who is at fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Fault {
+    /// The controller, which works but refuses.
+    Device,
+    /// Cable, network, address, or a device that is off.
+    Wire,
+    /// The program or converter at the other end breaks the protocol.
+    Peer,
+    /// Who asked.
+    Caller,
+    /// This program.
+    Us,
+}
+
+/// What became of the answer to a write.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum Loss {
+    /// It did not come in time.
+    #[error("none within {after:?}")]
+    TimedOut {
+        /// How long it was waited for.
+        after: Duration,
+    },
+    /// The connection dropped first.
+    #[error("{0}")]
+    Dropped(Outage),
+}
+
+/// Why an endpoint cannot be opened at all.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum OpenError {
+    /// This version reads such endpoints but has no transport for them.
+    #[error("{endpoint}: this version does not speak {} yet, use a tcp:// endpoint", endpoint.scheme())]
+    NotSpoken {
+        /// The endpoint asked for.
+        endpoint: Endpoint,
+    },
+    /// There is no tokio runtime to run the wire's task in.
+    #[error("a wire is opened inside a tokio runtime, and there is none")]
+    NoRuntime,
+}
+
+/// Why a wire is down, as one sentence that names the endpoint.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{endpoint}: {cause}")]
+pub struct Outage {
+    /// The other end of the wire.
+    pub endpoint: Arc<Endpoint>,
+    /// What happened.
+    pub cause: Cause,
+}
+
+/// What takes a wire down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum Cause {
+    /// The host is there, but nothing listens on the port.
+    #[error("connection refused: check the port, and that the device is on and takes Modbus connections")]
+    Refused,
+    /// No way to the host.
+    #[error("the host cannot be reached: check cable, address and network settings")]
+    Unreachable,
+    /// The host's name means nothing.
+    #[error("the host name is not known: check its spelling, or use the address")]
+    UnknownHost,
+    /// Nobody answered the attempt to connect.
+    #[error("nobody answered within {after:?}: check the address, and that the device is on")]
+    ConnectTimedOut {
+        /// How long it was tried.
+        after: Duration,
+    },
+    /// The connection was not there yet when the request's time was up.
+    #[error("not connected within {after:?}: check the address, and that the device is on")]
+    StillConnecting {
+        /// The time-out of the request.
+        after: Duration,
+    },
+    /// The peer ended the connection in good order.
+    #[error("the peer closed the connection: it may take fewer connections than are open")]
+    Closed,
+    /// The peer tore the connection down, or something between did.
+    #[error("the connection was reset: the peer restarted, or something between cut it")]
+    Reset,
+    /// Several requests in a row had no answer.
+    #[error("{requests} requests in a row had no answer: check that the device is on")]
+    Silent {
+        /// How many.
+        requests: u32,
+    },
+    /// The peer does not even take the bytes of a request.
+    #[error("the peer takes no more bytes: check that the device is on")]
+    Stuck,
+    /// Bytes came that are no Modbus TCP, and there is no telling where the next frame starts.
+    #[error("the peer sent bytes that are no Modbus TCP: check that the port is the right one")]
+    Garbage,
+    /// Anything else the operating system says.
+    #[error("{}", io_sentence(*kind, *code))]
+    Io {
+        /// The class of error.
+        kind: io::ErrorKind,
+        /// The system's own number for it.
+        code: Option<i32>,
+    },
+}
+
+/// What the operating system said, sorted.
+impl From<&io::Error> for Cause {
+    fn from(error: &io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::ConnectionRefused => Self::Refused,
+            io::ErrorKind::HostUnreachable | io::ErrorKind::NetworkUnreachable => Self::Unreachable,
+            io::ErrorKind::ConnectionReset | io::ErrorKind::ConnectionAborted | io::ErrorKind::BrokenPipe => {
+                Self::Reset
+            }
+            kind => Self::Io { kind, code: error.raw_os_error() },
+        }
+    }
+}
+
+fn io_sentence(kind: io::ErrorKind, code: Option<i32>) -> String {
+    match code {
+        Some(code) => io::Error::from_raw_os_error(code).to_string(),
+        None => kind.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outage(cause: Cause) -> Outage {
+        Outage { endpoint: Arc::new("tcp://10.0.0.7".parse().unwrap()), cause }
+    }
+
+    #[test]
+    fn says_what_where_and_what_to_do() {
+        for (error, fault, sentence) in [
+            (
+                LinkError::Exception { unit: 1, function: 3, code: ExceptionCode(2) },
+                Fault::Device,
+                "unit 1 answered function 3 with exception 2 (illegal data address)",
+            ),
+            (
+                LinkError::Timeout { unit: 7, after: Duration::from_millis(1500), tries: 2 },
+                Fault::Wire,
+                "unit 7 did not answer within 1.5s, asked 2 times: check the unit id and that the device is on",
+            ),
+            (
+                LinkError::Down { reason: outage(Cause::Refused) },
+                Fault::Wire,
+                "tcp://10.0.0.7:502: connection refused: check the port, and that the device is on and takes Modbus connections",
+            ),
+            (
+                LinkError::Down { reason: outage(Cause::Garbage) },
+                Fault::Peer,
+                "tcp://10.0.0.7:502: the peer sent bytes that are no Modbus TCP: check that the port is the right one",
+            ),
+            (
+                LinkError::Lost { unit: 1, loss: Loss::TimedOut { after: Duration::from_secs(1) } },
+                Fault::Wire,
+                "the answer to a write to unit 1 was lost (none within 1s); it may have taken effect: read the state before anything else",
+            ),
+            (
+                LinkError::NotARead { function: 6 },
+                Fault::Caller,
+                "function 6 does not read registers: use 3 (holding) or 4 (input)",
+            ),
+        ] {
+            assert_eq!(error.to_string(), sentence);
+            assert_eq!(error.fault(), fault, "{sentence}");
+        }
+    }
+
+    #[test]
+    fn sorts_what_the_system_says() {
+        for (kind, cause) in [
+            (io::ErrorKind::ConnectionRefused, Cause::Refused),
+            (io::ErrorKind::NetworkUnreachable, Cause::Unreachable),
+            (io::ErrorKind::BrokenPipe, Cause::Reset),
+            (
+                io::ErrorKind::AddrNotAvailable,
+                Cause::Io { kind: io::ErrorKind::AddrNotAvailable, code: None },
+            ),
+        ] {
+            assert_eq!(Cause::from(&io::Error::from(kind)), cause);
+        }
+        let full = Cause::from(&io::Error::from_raw_os_error(24));
+        assert!(full.to_string().contains("os error 24"), "{full}");
+    }
+}

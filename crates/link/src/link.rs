@@ -1,0 +1,216 @@
+//! The handle on a wire: what callers hold, and how their requests reach the task.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::{Duration, SystemTime};
+
+use busbar_modbus::Framing;
+use tokio::runtime::Handle;
+use tokio::sync::watch;
+
+use crate::endpoint::Endpoint;
+use crate::error::{LinkError, OpenError, Outage};
+use crate::job::{Ask, Job, Outcome, Priority, Write};
+use crate::options::Options;
+use crate::queue::Ticket;
+use crate::shared::Shared;
+use crate::statistics::Statistics;
+use crate::task::Task;
+use crate::wire::Wire;
+
+/// A handle on one wire. Clones share the wire; it is closed when the last one is gone.
+#[derive(Clone, Debug)]
+pub struct Link {
+    owner: Arc<Owner>,
+    priority: Priority,
+    timeout: Duration,
+}
+
+impl Link {
+    /// Opens a wire and starts to connect. Whether it is up is seen from [`Self::state`] or the first request.
+    ///
+    /// # Errors
+    /// [`OpenError::NotSpoken`] for endpoints other than `tcp://`, [`OpenError::NoRuntime`] outside a tokio runtime.
+    pub fn open(endpoint: Endpoint, options: Options) -> Result<Self, OpenError> {
+        let Endpoint::Tcp { .. } = endpoint else {
+            return Err(OpenError::NotSpoken { endpoint });
+        };
+        let runtime = Handle::try_current().map_err(|_| OpenError::NoRuntime)?;
+
+        let endpoint = Arc::new(endpoint);
+        let wire = Wire::new(Arc::clone(&endpoint), Framing::Tcp, &options);
+        let shared = Arc::new(Shared::new(wire, options.trace.is_some()));
+        let timeout = options.timeout;
+        runtime.spawn(Task::new(Arc::clone(&shared), Arc::clone(&endpoint), options));
+        Ok(Self { owner: Arc::new(Owner { shared, endpoint }), priority: Priority::Person, timeout })
+    }
+
+    /// The same wire for requests of another priority. A link starts as [`Priority::Person`].
+    #[must_use]
+    pub fn with_priority(&self, priority: Priority) -> Self {
+        Self { priority, ..self.clone() }
+    }
+
+    /// The same wire for requests with another time-out than [`Options::timeout`].
+    #[must_use]
+    pub fn with_timeout(&self, timeout: Duration) -> Self {
+        Self { timeout, ..self.clone() }
+    }
+
+    /// Reads registers side by side, 1 to 125, with function 3 (holding) or 4 (input).
+    ///
+    /// There may be fewer than asked for: some devices cut long reads.
+    ///
+    /// # Errors
+    /// Any [`LinkError`] but [`LinkError::Lost`].
+    pub async fn read_registers(
+        &self,
+        unit: u8,
+        function: u8,
+        address: u16,
+        count: u16,
+    ) -> Result<Vec<u16>, LinkError> {
+        let mut registers = Vec::with_capacity(usize::from(count.min(125)));
+        self.read_registers_into(unit, function, address, count, &mut registers).await?;
+        Ok(registers)
+    }
+
+    /// Like [`Self::read_registers`], into a buffer of the caller's: nothing is allocated once it has grown.
+    ///
+    /// The buffer holds what came, and nothing after an error.
+    ///
+    /// # Errors
+    /// As [`Self::read_registers`].
+    pub async fn read_registers_into(
+        &self,
+        unit: u8,
+        function: u8,
+        address: u16,
+        count: u16,
+        registers: &mut Vec<u16>,
+    ) -> Result<(), LinkError> {
+        registers.clear();
+        let job = Job {
+            unit,
+            ask: Ask::read(function, address, count)?,
+            priority: self.priority,
+            timeout: self.timeout,
+            registers: std::mem::take(registers),
+        };
+        let outcome = self.ask(job).await;
+        *registers = outcome.registers;
+        outcome.result
+    }
+
+    /// Changes a device. The request leaves at most once; it goes ahead of every read that waits.
+    ///
+    /// Dropped before it was sent, it is not sent.
+    ///
+    /// # Errors
+    /// [`LinkError::Lost`] when it left and no answer came: it may have taken effect. After any other error it has not.
+    pub async fn write(&self, unit: u8, write: Write) -> Result<(), LinkError> {
+        let job = Job {
+            unit,
+            ask: Ask::Write(write),
+            priority: Priority::Command,
+            timeout: self.timeout,
+            registers: Vec::new(),
+        };
+        self.ask(job).await.result
+    }
+
+    /// Everything the wire has counted so far.
+    pub fn statistics(&self) -> Statistics {
+        self.owner.shared.lock().wire.statistics()
+    }
+
+    /// The state of the connection, and its changes.
+    pub fn state(&self) -> watch::Receiver<WireState> {
+        self.owner.shared.state.subscribe()
+    }
+
+    /// Where the wire ends.
+    pub fn endpoint(&self) -> &Endpoint {
+        &self.owner.endpoint
+    }
+
+    fn ask(&self, job: Job) -> Asking<'_> {
+        Asking { shared: &self.owner.shared, stage: Stage::New(job) }
+    }
+}
+
+/// The state of a wire's connection.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum WireState {
+    /// The first connection is being made, or one that has just dropped is made anew.
+    Connecting,
+    /// Requests can be sent.
+    Connected,
+    /// There is no connection; it is tried again in growing intervals, and requests fail until then.
+    Down {
+        /// Why, as a sentence that names the endpoint.
+        reason: Outage,
+        /// Since when it has been down, whatever the reason was at first.
+        since: SystemTime,
+    },
+}
+
+/// Closes the wire when the last handle goes.
+#[derive(Debug)]
+struct Owner {
+    shared: Arc<Shared>,
+    endpoint: Arc<Endpoint>,
+}
+
+impl Drop for Owner {
+    fn drop(&mut self) {
+        self.shared.close();
+    }
+}
+
+/// One request on its way. Dropped early, it takes its job back.
+struct Asking<'a> {
+    shared: &'a Shared,
+    stage: Stage,
+}
+
+enum Stage {
+    New(Job),
+    Queued(Ticket),
+    Over,
+}
+
+impl Future for Asking<'_> {
+    type Output = Outcome;
+
+    fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Outcome> {
+        match std::mem::replace(&mut self.stage, Stage::Over) {
+            Stage::New(job) => match self.shared.submit(cx, job) {
+                Ok(ticket) => {
+                    self.stage = Stage::Queued(ticket);
+                    Poll::Pending
+                }
+                Err(outcome) => Poll::Ready(outcome),
+            },
+            Stage::Queued(ticket) => {
+                let outcome = self.shared.poll(cx, &ticket);
+                if outcome.is_pending() {
+                    self.stage = Stage::Queued(ticket);
+                }
+                outcome
+            }
+            Stage::Over => Poll::Pending,
+        }
+    }
+}
+
+impl Drop for Asking<'_> {
+    fn drop(&mut self) {
+        if let Stage::Queued(ticket) = std::mem::replace(&mut self.stage, Stage::Over) {
+            self.shared.cancel(ticket);
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! How a wire behaves: time-outs, retries, back-off.
+
+use std::time::Duration;
+
+use crate::trace::Trace;
+
+/// How a wire behaves. The defaults suit a controller on a local network.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// How long one attempt to connect may take.
+    pub connect_timeout: Duration,
+    /// How long each try of a request waits for its answer.
+    pub timeout: Duration,
+    /// Least time between the end of one exchange and the next request.
+    pub spacing: Duration,
+    /// How often a read is sent again after a time-out or a drop. Writes never are.
+    pub retries: u8,
+    /// Most requests that may wait in each class of priority.
+    pub queue: usize,
+    /// After so many time-outs in a row the connection is taken for dead and made anew.
+    pub timeouts_to_drop: u32,
+    /// How long to wait before a connection that failed is tried again.
+    pub backoff: Backoff,
+    /// Sees every frame, both ways.
+    pub trace: Option<Trace>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            connect_timeout: Duration::from_secs(3),
+            timeout: Duration::from_secs(1),
+            spacing: Duration::ZERO,
+            retries: 1,
+            queue: 64,
+            timeouts_to_drop: 3,
+            backoff: Backoff::default(),
+            trace: None,
+        }
+    }
+}
+
+/// A wait that doubles with each failure, up to a limit. It has no jitter: each wire is one client.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Backoff {
+    /// After the first failure.
+    pub first: Duration,
+    /// The longest.
+    pub max: Duration,
+}
+
+impl Backoff {
+    /// The wait after so many failures in a row.
+    pub fn delay(self, failures: u32) -> Duration {
+        let doubled = 2_u32.saturating_pow(failures.saturating_sub(1));
+        self.first.saturating_mul(doubled).min(self.max)
+    }
+}
+
+/// From 0.2 s to 10 s.
+impl Default for Backoff {
+    fn default() -> Self {
+        Self { first: Duration::from_millis(200), max: Duration::from_secs(10) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn backs_off_by_doubling() {
+        let delays: Vec<_> =
+            [0, 1, 2, 3, 6, 7, 40].map(|failures| Backoff::default().delay(failures).as_millis()).into();
+        assert_eq!(delays, [200, 200, 400, 800, 6400, 10_000, 10_000]);
+    }
+}

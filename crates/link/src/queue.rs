@@ -1,0 +1,322 @@
+//! What waits for a wire, in which order, and who is to be woken when it is done.
+
+use std::task::{Poll, Waker};
+use std::time::Duration;
+
+use crate::error::LinkError;
+use crate::job::{Job, Outcome, Priority};
+
+/// A caller's claim on one outcome.
+///
+/// Not `Clone`: it ends with the outcome, or with `cancel`.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Ticket(usize);
+
+impl Ticket {
+    pub(crate) fn place(&self) -> Place {
+        Place(self.0)
+    }
+}
+
+/// A job's place in the queue, for the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place(usize);
+
+/// Jobs by priority, first come first served within one.
+///
+/// Slots are used again and the lists run through them, so a wire in its stride allocates nothing and touches little.
+#[derive(Debug)]
+pub(crate) struct Queue {
+    slots: Vec<Slot>,
+    waiting: [List; Priority::COUNT],
+    free: List,
+    /// Most jobs that may wait in one priority, so that polling cannot shut out a command.
+    capacity: usize,
+}
+
+impl Queue {
+    pub(crate) fn new(capacity: usize) -> Self {
+        Self { slots: Vec::new(), waiting: Default::default(), free: List::default(), capacity }
+    }
+
+    /// Whether one more job of this priority may wait.
+    pub(crate) fn room(&self, priority: Priority) -> Result<(), LinkError> {
+        let waiting = self.waiting[priority.index()].length;
+        match waiting < self.capacity {
+            true => Ok(()),
+            false => Err(LinkError::QueueFull { waiting }),
+        }
+    }
+
+    /// Puts a job behind the others of its priority. Ask for `room` first.
+    pub(crate) fn push(&mut self, entry: Entry) -> Ticket {
+        let class = entry.job.priority.index();
+        let index = match self.free.pop_front(&self.slots) {
+            Some(index) => {
+                let slot = &mut self.slots[index];
+                slot.stage = Stage::Pending;
+                slot.entry = entry;
+                index
+            }
+            None => {
+                self.slots.push(Slot { next: None, stage: Stage::Pending, entry, result: Ok(()) });
+                self.slots.len() - 1
+            }
+        };
+        self.waiting[class].push_back(&mut self.slots, index);
+        Ticket(index)
+    }
+
+    /// The job whose turn it is. It keeps its slot until it is finished or put back.
+    pub(crate) fn pop(&mut self) -> Option<Place> {
+        let Self { slots, waiting, .. } = self;
+        waiting.iter_mut().find_map(|class| class.pop_front(slots)).map(Place)
+    }
+
+    /// Puts a popped job in front of the others of its priority: its next try.
+    pub(crate) fn put_back(&mut self, place: Place) {
+        if let Some(entry) = self.entry(place) {
+            let class = entry.job.priority.index();
+            self.waiting[class].push_front(&mut self.slots, place.0);
+        }
+    }
+
+    /// A job that is not finished; none when its caller is gone.
+    pub(crate) fn entry(&mut self, place: Place) -> Option<&mut Entry> {
+        let slot = self.slots.get_mut(place.0)?;
+        (slot.stage == Stage::Pending).then_some(&mut slot.entry)
+    }
+
+    /// Ends a popped job; its caller's waker goes to `wakes`.
+    pub(crate) fn finish(&mut self, place: Place, result: Result<(), LinkError>, wakes: &mut Vec<Waker>) {
+        let Some(slot) = self.slots.get_mut(place.0) else { return };
+        match slot.stage {
+            Stage::Pending => {
+                slot.stage = Stage::Done;
+                slot.result = result;
+                wakes.extend(slot.entry.waker.take());
+            }
+            Stage::Abandoned => self.release(place.0),
+            Stage::Done | Stage::Free => {}
+        }
+    }
+
+    /// Ends every waiting job that `judge` has an error for.
+    pub(crate) fn fail_waiting(
+        &mut self,
+        mut judge: impl FnMut(&Entry) -> Option<LinkError>,
+        wakes: &mut Vec<Waker>,
+    ) {
+        for class in 0..self.waiting.len() {
+            let mut whole = std::mem::take(&mut self.waiting[class]);
+            while let Some(index) = whole.pop_front(&self.slots) {
+                match judge(&self.slots[index].entry) {
+                    Some(error) => self.finish(Place(index), Err(error), wakes),
+                    None => self.waiting[class].push_back(&mut self.slots, index),
+                }
+            }
+        }
+    }
+
+    /// Jobs that wait, popped ones not among them.
+    pub(crate) fn waiting(&self) -> impl Iterator<Item = &Entry> {
+        let indexes = self.waiting.iter().flat_map(|class| class.indexes(&self.slots));
+        indexes.map(|index| &self.slots[index].entry)
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.waiting.iter().all(|class| class.length == 0)
+    }
+
+    /// The outcome if there is one; otherwise `waker` will be woken for it.
+    pub(crate) fn take(&mut self, ticket: &Ticket, waker: &Waker) -> Poll<Outcome> {
+        let slot = &mut self.slots[ticket.0];
+        if slot.stage != Stage::Done {
+            match &mut slot.entry.waker {
+                Some(known) => known.clone_from(waker),
+                none => *none = Some(waker.clone()),
+            }
+            return Poll::Pending;
+        }
+        let outcome = Outcome {
+            result: std::mem::replace(&mut slot.result, Ok(())),
+            registers: std::mem::take(&mut slot.entry.job.registers),
+        };
+        self.release(ticket.0);
+        Poll::Ready(outcome)
+    }
+
+    /// The caller is gone: a waiting job is forgotten, one on the wire runs to its end for nobody.
+    pub(crate) fn cancel(&mut self, ticket: Ticket) {
+        let index = ticket.0;
+        let slot = &mut self.slots[index];
+        slot.entry.waker = None;
+        match slot.stage {
+            Stage::Pending => {
+                let class = slot.entry.job.priority.index();
+                match self.waiting[class].remove(&mut self.slots, index) {
+                    true => self.release(index),
+                    false => self.slots[index].stage = Stage::Abandoned,
+                }
+            }
+            Stage::Done => self.release(index),
+            Stage::Free | Stage::Abandoned => {}
+        }
+    }
+
+    fn release(&mut self, index: usize) {
+        self.slots[index].stage = Stage::Free;
+        self.free.push_front(&mut self.slots, index);
+    }
+}
+
+/// A job and its way through the queue.
+#[derive(Debug)]
+pub(crate) struct Entry {
+    pub(crate) job: Job,
+    /// When it was asked.
+    pub(crate) since: Duration,
+    /// How often it was sent.
+    pub(crate) tries: u8,
+    pub(crate) waker: Option<Waker>,
+}
+
+/// Room for one job and then for its result. The entry of a free slot means nothing.
+#[derive(Debug)]
+struct Slot {
+    /// Behind this one in whichever list it is.
+    next: Option<usize>,
+    stage: Stage,
+    entry: Entry,
+    result: Result<(), LinkError>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Free,
+    /// Waiting, or popped and on the wire.
+    Pending,
+    /// On the wire, and its caller is gone.
+    Abandoned,
+    Done,
+}
+
+/// A list of slots, linked through them.
+#[derive(Debug, Default)]
+struct List {
+    first: Option<usize>,
+    last: usize,
+    length: usize,
+}
+
+impl List {
+    fn push_back(&mut self, slots: &mut [Slot], index: usize) {
+        slots[index].next = None;
+        match self.first {
+            Some(_) => slots[self.last].next = Some(index),
+            None => self.first = Some(index),
+        }
+        self.last = index;
+        self.length += 1;
+    }
+
+    fn push_front(&mut self, slots: &mut [Slot], index: usize) {
+        slots[index].next = self.first;
+        if self.first.is_none() {
+            self.last = index;
+        }
+        self.first = Some(index);
+        self.length += 1;
+    }
+
+    fn pop_front(&mut self, slots: &[Slot]) -> Option<usize> {
+        let index = self.first?;
+        self.first = slots[index].next;
+        self.length -= 1;
+        Some(index)
+    }
+
+    /// Says whether it was there.
+    fn remove(&mut self, slots: &mut [Slot], index: usize) -> bool {
+        let mut whole = std::mem::take(self);
+        let mut found = false;
+        while let Some(other) = whole.pop_front(slots) {
+            match other == index {
+                true => found = true,
+                false => self.push_back(slots, other),
+            }
+        }
+        found
+    }
+
+    fn indexes<'a>(&self, slots: &'a [Slot]) -> impl Iterator<Item = usize> + use<'a> {
+        std::iter::successors(self.first, |index| slots[*index].next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::Ask;
+
+    fn entry(priority: Priority, address: u16) -> Entry {
+        let job = Job {
+            unit: 1,
+            ask: Ask::Holding { address, count: 1 },
+            priority,
+            timeout: Duration::ZERO,
+            registers: vec![address],
+        };
+        Entry { job, since: Duration::ZERO, tries: 0, waker: None }
+    }
+
+    fn address(entry: &Entry) -> u16 {
+        entry.job.registers[0]
+    }
+
+    fn drain(queue: &mut Queue) -> Vec<u16> {
+        std::iter::from_fn(|| queue.pop().map(|place| address(queue.entry(place).unwrap()))).collect()
+    }
+
+    #[test]
+    fn keeps_order_within_priority_whatever_leaves() {
+        let mut queue = Queue::new(8);
+        for first in 1..=4 {
+            queue.push(entry(Priority::Poll, first));
+        }
+        let middle = queue.push(entry(Priority::Poll, 5));
+        queue.push(entry(Priority::Poll, 6));
+        let last = queue.push(entry(Priority::Poll, 7));
+        queue.cancel(middle);
+        queue.cancel(last);
+        // Both slots are used again.
+        queue.push(entry(Priority::Command, 8));
+        queue.push(entry(Priority::Poll, 9));
+        assert_eq!(queue.slots.len(), 7);
+        assert_eq!(queue.waiting().map(address).collect::<Vec<_>>(), [8, 1, 2, 3, 4, 6, 9]);
+
+        let mut wakes = Vec::new();
+        queue.fail_waiting(|entry| address(entry).is_multiple_of(2).then_some(LinkError::Closed), &mut wakes);
+        let first = queue.pop().unwrap();
+        queue.put_back(first);
+        assert_eq!(drain(&mut queue), [1, 3, 9]);
+        assert!(queue.is_empty());
+    }
+
+    #[test]
+    fn gives_the_buffer_back_with_the_result() {
+        let mut queue = Queue::new(1);
+        let ticket = queue.push(entry(Priority::Person, 7));
+        assert_eq!(queue.room(Priority::Person), Err(LinkError::QueueFull { waiting: 1 }));
+        assert_eq!(queue.room(Priority::Poll), Ok(()));
+        let place = queue.pop().unwrap();
+        queue.finish(place, Err(LinkError::Closed), &mut Vec::new());
+        // What ends twice keeps its first end.
+        queue.finish(place, Ok(()), &mut Vec::new());
+        let Poll::Ready(outcome) = queue.take(&ticket, Waker::noop()) else {
+            panic!("not done");
+        };
+        assert_eq!(outcome, Outcome { result: Err(LinkError::Closed), registers: vec![7] });
+        assert_eq!(queue.push(entry(Priority::Poll, 8)), ticket, "its slot is free");
+    }
+}

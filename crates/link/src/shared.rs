@@ -1,0 +1,290 @@
+//! What the handles on a wire and its task share: the rules and the connection, behind one lock.
+
+use std::mem::MaybeUninit;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker, ready};
+use std::time::Duration;
+
+use tokio::io::ReadBuf;
+use tokio::net::TcpStream;
+use tokio::sync::watch;
+use tokio::time::Instant;
+
+use crate::error::Cause;
+use crate::job::{Job, Outcome};
+use crate::link::WireState;
+use crate::port::Port;
+use crate::queue::{Place, Ticket};
+use crate::trace::Seen;
+use crate::wire::{Step, Wire};
+
+/// More than any frame: a read that does not fill it has emptied the socket, and the runtime knows so without asking
+/// the system again.
+const READ_SPACE: usize = 512;
+
+/// Reads in one go; a peer that sends without end must not keep others waiting.
+const READS: usize = 16;
+
+#[derive(Debug)]
+pub(crate) struct Shared {
+    pub(crate) state: watch::Sender<WireState>,
+    opened: Instant,
+    guarded: Mutex<Guarded>,
+}
+
+impl Shared {
+    pub(crate) fn new(wire: Wire, traced: bool) -> Self {
+        Self {
+            state: watch::Sender::new(WireState::Connecting),
+            opened: Instant::now(),
+            guarded: Mutex::new(Guarded {
+                wire,
+                port: Port::default(),
+                reader: None,
+                task: None,
+                alarm: None,
+                seen: traced.then(Vec::new),
+            }),
+        }
+    }
+
+    /// Nothing that can panic or block runs under this lock, so a poisoned one is still sound.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Guarded> {
+        self.guarded.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// When the wire's time began.
+    pub(crate) fn opened(&self) -> Instant {
+        self.opened
+    }
+
+    /// The wire's time.
+    pub(crate) fn now(&self) -> Duration {
+        self.opened.elapsed()
+    }
+
+    /// Takes a job in and gets it on its way.
+    pub(crate) fn submit(&self, cx: &mut Context<'_>, job: Job) -> Result<Ticket, Outcome> {
+        let mut wakes = Vec::new();
+        let mut guarded = self.lock();
+        let now = self.now();
+        let ticket = guarded.wire.submit(now, job, cx.waker())?;
+        guarded.dispatch(cx, now, ticket.place(), &mut wakes);
+        drop(guarded);
+        wakes.into_iter().for_each(Waker::wake);
+        Ok(ticket)
+    }
+
+    /// The outcome of a job, once it is there.
+    pub(crate) fn poll(&self, cx: &mut Context<'_>, ticket: &Ticket) -> Poll<Outcome> {
+        let mut wakes = Vec::new();
+        let mut guarded = self.lock();
+        if guarded.reader == Some(ticket.place()) {
+            // Nobody has to be woken who is awake.
+            guarded.wire.forget_waker(ticket);
+            guarded.read_answer(cx, || self.now(), &mut wakes);
+        }
+        let outcome = guarded.wire.take(ticket, cx.waker());
+        drop(guarded);
+        wakes.into_iter().for_each(Waker::wake);
+        outcome
+    }
+
+    /// A caller is gone.
+    pub(crate) fn cancel(&self, ticket: Ticket) {
+        let mut guarded = self.lock();
+        let mut task = None;
+        if guarded.reader == Some(ticket.place()) {
+            guarded.reader = None;
+            task = guarded.task.take();
+        }
+        guarded.wire.cancel(ticket);
+        drop(guarded);
+        task.into_iter().for_each(Waker::wake);
+    }
+
+    /// Ends everything: the last handle is gone, or the task is.
+    pub(crate) fn close(&self) {
+        let mut wakes = Vec::new();
+        let mut guarded = self.lock();
+        guarded.wire.close(&mut wakes);
+        guarded.port.close();
+        wakes.extend(guarded.task.take());
+        drop(guarded);
+        wakes.into_iter().for_each(Waker::wake);
+    }
+}
+
+/// The wire and its connection.
+///
+/// They are the task's. But a caller who finds the wire idle hands its frame to the system itself, and reads the answer
+/// itself when it comes, by the same rules and under the same lock: that saves two changes of task an exchange, which
+/// is what most of our own processor time would go to. The task takes the reading back
+/// - when its alarm rings, which is set for each deadline,
+/// - when somebody else wants the wire: a caller who forgets to poll its future holds up nobody but itself,
+/// - when the caller is gone, and for everything out of the ordinary.
+#[derive(Debug)]
+pub(crate) struct Guarded {
+    pub(crate) wire: Wire,
+    port: Port,
+    /// The job whose caller is woken for its answer; otherwise the task is, or nobody while nothing is under way.
+    reader: Option<Place>,
+    /// How to wake the task; it puts a waker here before it sleeps.
+    task: Option<Waker>,
+    /// When the task wakes by itself, if nothing wakes it before.
+    alarm: Option<Duration>,
+    /// What went over the wire and has not been shown yet, if somebody wants to see it.
+    seen: Option<Vec<Seen>>,
+}
+
+impl Guarded {
+    /// The task's turn: takes in what has come, and says what to do next.
+    pub(crate) fn turn(
+        &mut self,
+        cx: &mut Context<'_>,
+        now: Duration,
+        connected: Option<Result<TcpStream, Cause>>,
+        wakes: &mut Vec<Waker>,
+    ) -> Step {
+        self.reader = None;
+        match connected {
+            None => {}
+            Some(Ok(stream)) => {
+                self.port.open(stream);
+                self.wire.connected(now);
+            }
+            Some(Err(cause)) => self.wire.refused(now, cause, wakes),
+        }
+        self.read_all(cx, now, wakes);
+        if self.port.is_blocked() {
+            match self.port.poll_rest(cx) {
+                Poll::Ready(Ok(())) => self.wire.sent_rest(),
+                Poll::Ready(Err(cause)) => self.lost(now, cause, wakes),
+                Poll::Pending => {}
+            }
+        }
+
+        let step = self.wire.step(now, &mut self.port.frame, wakes);
+        match step {
+            Step::Send(_) => {
+                if !self.start() {
+                    // Once more, to be told when the system takes the rest.
+                    cx.waker().wake_by_ref();
+                }
+            }
+            Step::Disconnect => self.close(),
+            Step::Connect | Step::Wait(_) | Step::End => {}
+        }
+        step
+    }
+
+    /// The task sleeps until it is woken, or until `alarm`.
+    pub(crate) fn sleeps(&mut self, task: &Waker, alarm: Option<Duration>) {
+        self.alarm = alarm;
+        match &mut self.task {
+            Some(known) => known.clone_from(task),
+            none => *none = Some(task.clone()),
+        }
+    }
+
+    /// What went over the wire since this was last asked.
+    pub(crate) fn seen(&mut self) -> Vec<Seen> {
+        self.seen.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Gets a job that was just taken in on its way, or the task to do so.
+    fn dispatch(&mut self, cx: &mut Context<'_>, now: Duration, place: Place, wakes: &mut Vec<Waker>) {
+        let minded = match self.wire.is_busy() {
+            // The task looks into the queue when the exchange ends, if the answer wakes it.
+            true => self.reader.take().is_none(),
+            false => self.seen.is_none() && self.start_here(cx, now, place, wakes),
+        };
+        if !minded {
+            wakes.extend(self.task.take());
+        }
+    }
+
+    /// Sends the job from the caller's own task. Says whether the wire's task can sleep on.
+    fn start_here(
+        &mut self,
+        cx: &mut Context<'_>,
+        now: Duration,
+        place: Place,
+        wakes: &mut Vec<Waker>,
+    ) -> bool {
+        // What lies there answers nothing that is asked now, and it may say that the connection is gone. After this
+        // it is the caller who is woken.
+        self.read_all(cx, now, wakes);
+        let Some(until) = self.wire.start_next(now, &mut self.port.frame, wakes) else {
+            return false;
+        };
+        let whole = self.start();
+        if !whole || self.wire.under_way() != Some(place) {
+            return false;
+        }
+        self.reader = Some(place);
+        self.alarm.is_some_and(|alarm| now < alarm && alarm <= until)
+    }
+
+    /// Reads for the one exchange that is under way, from its caller's own task.
+    fn read_answer(&mut self, cx: &mut Context<'_>, now: impl Fn() -> Duration, wakes: &mut Vec<Waker>) {
+        while self.wire.is_busy() {
+            if self.read(cx, &now, wakes).is_pending() {
+                return;
+            }
+        }
+        self.reader = None;
+        if !self.wire.is_at_rest() {
+            wakes.extend(self.task.take());
+        }
+    }
+
+    fn read_all(&mut self, cx: &mut Context<'_>, now: Duration, wakes: &mut Vec<Waker>) {
+        for _ in 0..READS {
+            if self.read(cx, || now, wakes).is_pending() {
+                return;
+            }
+        }
+        cx.waker().wake_by_ref();
+    }
+
+    fn read(&mut self, cx: &mut Context<'_>, now: impl Fn() -> Duration, wakes: &mut Vec<Waker>) -> Poll<()> {
+        let mut space = [MaybeUninit::uninit(); READ_SPACE];
+        let mut space = ReadBuf::uninit(&mut space);
+        match ready!(self.port.poll_read(cx, &mut space)) {
+            Ok(()) => {
+                if let Some(seen) = &mut self.seen {
+                    seen.push(Seen::Received(space.filled().to_vec()));
+                }
+                self.wire.received(now(), space.filled(), wakes);
+            }
+            Err(cause) => self.lost(now(), cause, wakes),
+        }
+        Poll::Ready(())
+    }
+
+    /// Sends the frame, and says whether all of it has left; if not, the task sends the rest.
+    fn start(&mut self) -> bool {
+        if let Some(seen) = &mut self.seen {
+            seen.push(Seen::Sent(self.port.frame.clone()));
+        }
+        let sent = self.port.start();
+        let whole = !self.port.is_blocked();
+        if !whole {
+            self.wire.sent_only(sent);
+        }
+        whole
+    }
+
+    fn lost(&mut self, now: Duration, cause: Cause, wakes: &mut Vec<Waker>) {
+        self.close();
+        self.wire.lost(now, cause, wakes);
+    }
+
+    fn close(&mut self) {
+        self.port.close();
+        if let Some(seen) = &mut self.seen {
+            seen.push(Seen::Closed);
+        }
+    }
+}
