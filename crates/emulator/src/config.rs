@@ -1,0 +1,47 @@
+//! What to imitate, and where.
+
+use std::time::Duration;
+
+use busbar_link::Endpoint;
+
+/// How one imitated controller is to be started.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Profile of the controller, such as `datakom-d`.
+    pub profile: String,
+    /// The unit id that it answers to.
+    pub unit: u8,
+    /// Model of the family; the demonstration model when none is given.
+    pub model: Option<String>,
+    /// Where to listen; port 0 lets the system choose. Several endpoints share one plant.
+    pub listen: Vec<Endpoint>,
+    /// The same seed, inputs and simulated time give the same registers.
+    pub seed: u64,
+    /// Simulated seconds a second, above 0 and up to [`MAX_SPEED`](crate::MAX_SPEED).
+    pub speed: f64,
+    /// Values that stay as they are, as point id and text.
+    pub pins: Vec<(String, String)>,
+    /// Something happens at the site by itself: the demonstration wants it.
+    pub story: bool,
+    /// Connections served at the same time; further ones are closed at once.
+    pub connections: usize,
+    /// A connection without a byte for this long is closed, at the latest after twice as long.
+    pub idle: Duration,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            profile: "datakom-d".to_owned(),
+            unit: 1,
+            model: None,
+            listen: Vec::new(),
+            seed: 1,
+            speed: 1.0,
+            pins: Vec::new(),
+            story: false,
+            connections: 128,
+            idle: Duration::from_secs(300),
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! Imitated controllers: a small plant that obeys physics, a panel with its logic, and the wire rules of the manual.
+//!
+//! From the inside out:
+//! - the plant (mains, genset, load, tank) is stepped by a simulated clock and a seed;
+//! - a panel reads it, drives it, and stores every documented register through the profile;
+//! - [`Device`] puts the wire rules in front: requests in, responses out, no I/O;
+//! - [`start`] gives a device sockets and a clock.
+
+mod bank;
+mod config;
+mod datakom_d;
+mod device;
+mod error;
+mod lcd;
+mod panel;
+mod pins;
+mod plant;
+mod random;
+mod rules;
+mod server;
+mod waveform;
+
+pub use config::Config;
+pub use device::{Device, STEP};
+pub use error::{PinError, PinProblem, StartError};
+pub use server::{Emulation, Statistics, start};
+
+/// The fastest simulated clock: an hour a second.
+pub const MAX_SPEED: f64 = 3600.0;

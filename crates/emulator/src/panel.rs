@@ -1,0 +1,28 @@
+//! What every imitated controller has in common: it lives, takes writes and fills its registers.
+
+use std::fmt::Debug;
+use std::time::Duration;
+
+use crate::bank::Bank;
+use crate::rules::Refusals;
+
+/// One controller family, with the plant that it controls.
+pub(crate) trait Panel: Debug + Send {
+    /// Lets `dt` of simulated time pass.
+    fn step(&mut self, dt: Duration);
+
+    /// Takes a write to a register that the profile says is writable. Values that mean nothing have no effect.
+    fn write(&mut self, address: u16, value: u16);
+
+    /// Whether the controller is restarting: it then hears and answers nothing.
+    fn is_silent(&self) -> bool;
+
+    /// Stores every documented register.
+    fn render(&self, bank: &mut Bank);
+
+    /// A packet has come in over Ethernet.
+    fn count_packet(&mut self, bank: &mut Bank);
+
+    /// The maker's exception codes.
+    fn refusals(&self) -> Refusals;
+}

@@ -1,0 +1,362 @@
+//! The plant behind a panel: mains, genset, load, breakers, tank and batteries, stepped by a simulated clock.
+//!
+//! The same seed, steps and controls give the same plant to the last bit. What a panel shows must follow from
+//! here: no register has a value of its own that contradicts another.
+
+mod electrical;
+mod engine;
+mod supplies;
+
+pub(crate) use electrical::{Energy, Feed};
+pub(crate) use engine::Engine;
+pub(crate) use supplies::{Battery, Tank};
+
+use crate::random::{Drift, Random, approach};
+
+/// Nameplate of the imitated genset: 100 kVA, 230/400 V, 50 Hz, four poles.
+pub(crate) const RATED_KW: f64 = 80.0;
+pub(crate) const RATED_KVA: f64 = 100.0;
+pub(crate) const RATED_RPM: f64 = 1500.0;
+const RATED_VOLTAGE: f64 = 230.9;
+/// Four poles: two periods a turn.
+const HERTZ_PER_RPM: f64 = 2.0 / 60.0;
+/// Seconds a breaker takes from command to position.
+const BREAKER_SECONDS: f64 = 0.2;
+
+/// What a panel can do to the plant.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Controls {
+    /// Fuel solenoid open.
+    pub(crate) fuel: bool,
+    /// Starter motor engaged.
+    pub(crate) starter: bool,
+    /// Governor at idle speed.
+    pub(crate) idle: bool,
+    /// Coolant heater on.
+    pub(crate) block_heater: bool,
+    /// Pump from the main tank into the day tank.
+    pub(crate) fuel_pump: bool,
+    /// Genset breaker commanded closed.
+    pub(crate) genset_breaker: bool,
+    /// Mains breaker commanded closed.
+    pub(crate) mains_breaker: bool,
+}
+
+/// The whole of it; a panel reads the fields and hands back [`Controls`].
+#[derive(Clone, Debug)]
+pub(crate) struct Plant {
+    /// Seconds since power-on.
+    pub(crate) time: f64,
+    pub(crate) mains: Feed,
+    pub(crate) mains_energy: Energy,
+    pub(crate) genset: Feed,
+    pub(crate) genset_energy: Energy,
+    pub(crate) engine: Engine,
+    pub(crate) mains_breaker: Breaker,
+    pub(crate) genset_breaker: Breaker,
+    pub(crate) batteries: [Battery; 2],
+    pub(crate) tank: Tank,
+    /// degC.
+    pub(crate) ambient: f64,
+    /// degC under the canopy.
+    pub(crate) canopy: f64,
+    utility: Utility,
+    load: Load,
+    alternator: f64,
+    weather: Drift,
+    random: Random,
+}
+
+impl Plant {
+    pub(crate) fn new(seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let mut plant = Self {
+            time: 0.0,
+            mains: Feed::default(),
+            mains_energy: past_energy(random.between(110_000.0, 160_000.0)),
+            genset: Feed::default(),
+            genset_energy: past_energy(random.between(18_000.0, 31_000.0)),
+            engine: Engine::new(&mut random),
+            mains_breaker: Breaker::new(true),
+            genset_breaker: Breaker::new(false),
+            batteries: [Battery::new(&mut random), Battery::new(&mut random)],
+            tank: Tank::new(random.between(70.0, 85.0)),
+            ambient: 18.0,
+            canopy: 21.0,
+            utility: Utility::new(&mut random),
+            load: Load::new(&mut random),
+            alternator: 0.0,
+            weather: Drift::new(0.4, 600.0, &mut random),
+            random,
+        };
+        // One step fills the meters, so that the first image is a whole one.
+        plant.step(0.1, &Controls { mains_breaker: true, ..Controls::default() });
+        plant.time = 0.0;
+        plant
+    }
+
+    /// Lets `dt` seconds pass; meant for steps of about a tenth of a second.
+    pub(crate) fn step(&mut self, dt: f64, controls: &Controls) {
+        self.time += dt;
+        self.climate(dt);
+        self.mains_breaker.step(dt, controls.mains_breaker);
+        self.genset_breaker.step(dt, controls.genset_breaker);
+
+        let carried = self.genset.total_active();
+        self.engine.step(dt, controls, carried, self.canopy, &mut self.random);
+        self.electricity(dt);
+
+        let charger = self.mains.average_voltage() > 180.0;
+        for battery in &mut self.batteries {
+            battery.step(dt, controls.starter, self.engine.is_running(), charger, &mut self.random);
+        }
+        self.tank.step(dt, self.engine.burn, controls.fuel_pump);
+    }
+
+    /// Whether the mains are good enough to feed the load.
+    pub(crate) fn mains_healthy(&self) -> bool {
+        self.mains.voltage.iter().all(|volts| (190.0..260.0).contains(volts))
+            && (47.0..53.0).contains(&self.mains.frequency)
+    }
+
+    /// Whether the genset is good enough to feed the load.
+    pub(crate) fn genset_healthy(&self) -> bool {
+        self.genset.voltage.iter().all(|volts| (200.0..260.0).contains(volts))
+            && (47.0..53.0).contains(&self.genset.frequency)
+    }
+
+    fn climate(&mut self, dt: f64) {
+        // Power-on is ten in the morning; the warmest hour is three in the afternoon.
+        let hour = 10.0 + self.time / 3600.0;
+        let day = 4.0 * ((hour - 9.0) / 24.0 * std::f64::consts::TAU).sin();
+        self.ambient = 19.0 + day + self.weather.step(dt, &mut self.random);
+        let warmer = 2.0 + 0.25 * (self.engine.coolant - self.ambient).max(0.0);
+        approach(&mut self.canopy, self.ambient + warmer, 240.0, dt);
+    }
+
+    fn electricity(&mut self, dt: f64) {
+        let residual = 4.0 * self.engine.speed / RATED_RPM;
+        let excited = match self.engine.speed {
+            rpm if rpm > 700.0 => RATED_VOLTAGE * (rpm / (0.95 * RATED_RPM)).min(1.0),
+            _ => residual,
+        };
+        approach(&mut self.alternator, excited, 0.4, dt);
+        // An alternator that does not turn has no voltage at all, however slowly the regulator forgets.
+        let alternator = if self.engine.speed > 0.0 { self.alternator } else { 0.0 };
+
+        let (active, reactive) = self.load.step(dt, &mut self.random);
+        let (mut mains_load, mut genset_load) = (([0.0; 3], [0.0; 3]), ([0.0; 3], [0.0; 3]));
+        if self.mains_breaker.closed && self.utility.is_alive() {
+            mains_load = (active, reactive);
+        } else if self.genset_breaker.closed && alternator > 100.0 {
+            genset_load = (active, reactive);
+        }
+
+        let (voltage, frequency) = self.utility.step(dt, mains_load.0.iter().sum(), &mut self.random);
+        self.mains = Feed { voltage, frequency, active: mains_load.0, reactive: mains_load.1 };
+        self.mains_energy.add(&self.mains, dt);
+
+        let ripple = 0.0006 * alternator;
+        self.genset = Feed {
+            voltage: [0.9985, 1.0008, 1.0007].map(|part| part * alternator + ripple * self.random.noise()),
+            frequency: self.engine.speed * HERTZ_PER_RPM,
+            active: genset_load.0,
+            reactive: genset_load.1,
+        };
+        self.genset_energy.add(&self.genset, dt);
+    }
+}
+
+/// A breaker that follows its command after its operating time.
+#[derive(Clone, Debug)]
+pub(crate) struct Breaker {
+    pub(crate) closed: bool,
+    moving: f64,
+}
+
+impl Breaker {
+    fn new(closed: bool) -> Self {
+        Self { closed, moving: 0.0 }
+    }
+
+    fn step(&mut self, dt: f64, command: bool) {
+        self.moving = if command == self.closed { 0.0 } else { self.moving + dt };
+        if self.moving >= BREAKER_SECONDS {
+            self.closed = command;
+            self.moving = 0.0;
+        }
+    }
+}
+
+/// The public grid at the meter.
+#[derive(Clone, Debug)]
+struct Utility {
+    common: Drift,
+    phases: [Drift; 3],
+    frequency: Drift,
+}
+
+impl Utility {
+    fn new(random: &mut Random) -> Self {
+        Self {
+            common: Drift::new(1.2, 180.0, random),
+            phases: std::array::from_fn(|_| Drift::new(0.5, 15.0, random)),
+            frequency: Drift::new(0.012, 8.0, random),
+        }
+    }
+
+    /// The mains never fail in this version; what fails them belongs here.
+    fn is_alive(&self) -> bool {
+        true
+    }
+
+    fn step(&mut self, dt: f64, load: f64, random: &mut Random) -> ([f64; 3], f64) {
+        let level = 231.5 + self.common.step(dt, random) - 0.02 * load;
+        let voltage = std::array::from_fn(|phase| level + self.phases[phase].step(dt, random));
+        (voltage, 50.0 + self.frequency.step(dt, random))
+    }
+}
+
+/// The consumers: a base that wanders, and a machine that switches on and off.
+#[derive(Clone, Debug)]
+struct Load {
+    base: Drift,
+    power_factor: Drift,
+    shares: [Drift; 3],
+    machine_on: bool,
+    machine_switches_in: f64,
+}
+
+impl Load {
+    fn new(random: &mut Random) -> Self {
+        Self {
+            base: Drift::new(2.5, 90.0, random),
+            power_factor: Drift::new(0.012, 60.0, random),
+            shares: std::array::from_fn(|_| Drift::new(0.008, 120.0, random)),
+            machine_on: false,
+            machine_switches_in: random.between(20.0, 60.0),
+        }
+    }
+
+    /// kW and kvar of each phase, in the tenths that the controllers' meters resolve: totals are then the exact
+    /// sums of what is shown.
+    fn step(&mut self, dt: f64, random: &mut Random) -> ([f64; 3], [f64; 3]) {
+        self.machine_switches_in -= dt;
+        if self.machine_switches_in <= 0.0 {
+            self.machine_on = !self.machine_on;
+            self.machine_switches_in = random.between(40.0, 120.0);
+        }
+        let machine = if self.machine_on { 7.5 } else { 0.0 };
+        let total = 36.0 + machine + self.base.step(dt, random);
+        let power_factor = 0.885 + self.power_factor.step(dt, random);
+        let reactive_part = (1.0 - power_factor * power_factor).sqrt() / power_factor;
+
+        let mut shares = [0.342, 0.331, 0.327];
+        for (share, drift) in shares.iter_mut().zip(&mut self.shares) {
+            *share += drift.step(dt, random);
+        }
+        let whole: f64 = shares.iter().sum();
+        let active = shares.map(|share| tenth(total * share / whole));
+        (active, active.map(|kw| tenth(kw * reactive_part)))
+    }
+}
+
+fn past_energy(active: f64) -> Energy {
+    Energy { active, exported: 0.0, inductive: active * 0.47, capacitive: active * 0.003 }
+}
+
+fn tenth(value: f64) -> f64 {
+    (value * 10.0).round() / 10.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f64 = 0.1;
+
+    fn run(plant: &mut Plant, controls: &Controls, seconds: f64) {
+        for _ in 0..(seconds / DT) as u32 {
+            plant.step(DT, controls);
+        }
+    }
+
+    fn on_mains() -> Controls {
+        Controls { mains_breaker: true, ..Controls::default() }
+    }
+
+    fn start(plant: &mut Plant) -> Controls {
+        let mut controls = Controls { fuel: true, starter: true, ..on_mains() };
+        run(plant, &controls, 5.0);
+        controls.starter = false;
+        run(plant, &controls, 10.0);
+        controls
+    }
+
+    #[test]
+    fn mains_carry_the_load_from_the_first_image_on() {
+        let plant = Plant::new(1);
+        assert!(plant.mains_healthy());
+        assert!(plant.mains.total_active() > 25.0);
+        assert_eq!(plant.genset.voltage, [0.0; 3]);
+        assert_eq!(plant.time, 0.0);
+    }
+
+    #[test]
+    fn the_same_seed_is_the_same_plant() {
+        let walk = |seed| {
+            let mut plant = Plant::new(seed);
+            run(&mut plant, &on_mains(), 60.0);
+            (plant.mains.voltage, plant.mains_energy.active, plant.engine.coolant)
+        };
+        assert_eq!(walk(9), walk(9));
+        assert_ne!(walk(9), walk(10));
+    }
+
+    #[test]
+    fn a_started_genset_builds_up_voltage_and_takes_the_load() {
+        let mut plant = Plant::new(2);
+        let mut controls = start(&mut plant);
+        assert!(plant.genset_healthy(), "{:?}", plant.genset);
+        assert_eq!(plant.genset.total_active(), 0.0);
+
+        controls.mains_breaker = false;
+        run(&mut plant, &controls, 1.0);
+        assert_eq!(plant.mains.total_active(), 0.0);
+        controls.genset_breaker = true;
+        run(&mut plant, &controls, 5.0);
+        assert!(plant.genset.total_active() > 25.0);
+        assert!(plant.genset_healthy(), "{:?}", plant.genset);
+        assert!(plant.engine.burn > 8.0);
+    }
+
+    #[test]
+    fn a_breaker_takes_its_time() {
+        let mut breaker = Breaker::new(false);
+        breaker.step(0.1, true);
+        assert!(!breaker.closed);
+        breaker.step(0.1, true);
+        assert!(breaker.closed);
+    }
+
+    #[test]
+    fn cranking_dips_the_battery_and_is_remembered() {
+        let mut plant = Plant::new(4);
+        run(&mut plant, &on_mains(), 10.0);
+        let rest = plant.batteries[0].voltage;
+        start(&mut plant);
+        assert!(plant.batteries[0].cranking_minimum < rest - 4.0);
+        assert!(plant.batteries[0].voltage > 27.0, "the alternator charges it again");
+    }
+
+    #[test]
+    fn burned_fuel_leaves_the_tank() {
+        let mut plant = Plant::new(6);
+        let controls = start(&mut plant);
+        let (litres, burned) = (plant.tank.litres, plant.engine.burned);
+        run(&mut plant, &controls, 600.0);
+        let drawn = litres - plant.tank.litres;
+        assert!(drawn > 0.1);
+        assert!((drawn - (plant.engine.burned - burned)).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,11 @@
+//! The imitated controllers from outside: registers, time and sockets.
+#![cfg(test)]
+
+mod golden;
+mod identities;
+mod pins;
+mod prop;
+mod push_buttons;
+mod server;
+mod site;
+mod wire_rules;
