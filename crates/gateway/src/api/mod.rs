@@ -1,0 +1,206 @@
+//! The HTTP API `/api/v1` and the document that describes it.
+
+mod problem;
+pub mod types;
+
+use std::sync::{Arc, LazyLock};
+
+use axum::extract::rejection::QueryRejection;
+use axum::extract::{Path, Query, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::{Json, Router};
+use serde::Deserialize;
+use utoipa::{IntoParams, OpenApi};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+pub use self::problem::Problem;
+use self::types::{
+    AlarmView, AlarmsEvent, DeviceView, PointsView, SiteView, SnapshotEvent, ValueView, ValuesEvent, WireView,
+};
+use crate::events;
+use crate::hub::Hub;
+
+/// The OpenAPI 3.1 document of the API, as `/api/v1/openapi.json` serves it.
+pub fn openapi() -> utoipa::openapi::OpenApi {
+    routes().into_openapi()
+}
+
+/// Every route of the API, `/healthz` included.
+pub(crate) fn router(hub: Arc<Hub>) -> Router {
+    Router::from(routes()).with_state(hub)
+}
+
+fn routes() -> OpenApiRouter<Arc<Hub>> {
+    OpenApiRouter::with_openapi(Document::openapi())
+        .routes(routes!(site))
+        .routes(routes!(devices))
+        .routes(routes!(device))
+        .routes(routes!(points))
+        .routes(routes!(values))
+        .routes(routes!(alarms))
+        .routes(routes!(wires))
+        .routes(routes!(stream))
+        .routes(routes!(document))
+        .routes(routes!(healthz))
+}
+
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "Busbar",
+        description = "Live values, states and alarms of standby-power controllers. Read only.",
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
+    ),
+    // The events are not a body that the document could describe, so their shapes are named here.
+    components(schemas(SnapshotEvent, ValuesEvent, AlarmsEvent, Problem)),
+    tags((name = "site", description = "The site, its devices and its wires"), (name = "live", description = "What they read now")),
+)]
+struct Document;
+
+/// The site and every device on it.
+#[utoipa::path(get, path = "/api/v1/site", tag = "site", responses((status = OK, body = SiteView, description = "The site")))]
+async fn site(State(hub): State<Arc<Hub>>) -> Json<SiteView> {
+    Json(hub.site())
+}
+
+/// The devices in the order of the site file.
+#[utoipa::path(get, path = "/api/v1/devices", tag = "site", responses((status = OK, body = Vec<DeviceView>, description = "The devices")))]
+async fn devices(State(hub): State<Arc<Hub>>) -> Json<Vec<DeviceView>> {
+    Json(hub.device_views())
+}
+
+/// One device.
+#[utoipa::path(
+    get, path = "/api/v1/devices/{device}", tag = "site",
+    params(("device" = String, Path, description = "Id of the device", example = "gen1")),
+    responses(
+        (status = OK, body = DeviceView, description = "The device"),
+        (status = NOT_FOUND, body = Problem, content_type = "application/problem+json", description = "There is no such device"),
+    ),
+)]
+async fn device(
+    State(hub): State<Arc<Hub>>,
+    Path(device): Path<String>,
+) -> Result<Json<DeviceView>, Problem> {
+    hub.device_view(&device).map(Json)
+}
+
+/// The points of one device: what there is to read. It does not change while the gateway runs.
+#[utoipa::path(
+    get, path = "/api/v1/devices/{device}/points", tag = "site",
+    params(("device" = String, Path, description = "Id of the device", example = "gen1")),
+    responses(
+        (status = OK, body = PointsView, description = "Its points, in groups"),
+        (status = NOT_FOUND, body = Problem, content_type = "application/problem+json", description = "There is no such device"),
+    ),
+)]
+async fn points(
+    State(hub): State<Arc<Hub>>,
+    Path(device): Path<String>,
+) -> Result<Json<PointsView>, Problem> {
+    hub.points(&device).map(Json)
+}
+
+/// Which values of a device are wanted.
+#[derive(Debug, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct ValuesQuery {
+    /// Only the points of this group.
+    #[param(example = "genset")]
+    pub(crate) group: Option<String>,
+    /// Only these points: ids with commas between them.
+    #[param(example = "genset_l1_voltage,genset_frequency")]
+    pub(crate) point: Option<String>,
+}
+
+/// The values of one device, in address order.
+///
+/// Points that are read on demand only are listed once they have been read.
+#[utoipa::path(
+    get, path = "/api/v1/devices/{device}/values", tag = "live",
+    params(("device" = String, Path, description = "Id of the device", example = "gen1"), ValuesQuery),
+    responses(
+        (status = OK, body = Vec<ValueView>, description = "Its values"),
+        (status = BAD_REQUEST, body = Problem, content_type = "application/problem+json", description = "The query names what the device does not have"),
+        (status = NOT_FOUND, body = Problem, content_type = "application/problem+json", description = "There is no such device"),
+    ),
+)]
+async fn values(
+    State(hub): State<Arc<Hub>>,
+    Path(device): Path<String>,
+    query: Result<Query<ValuesQuery>, QueryRejection>,
+) -> Result<Json<Vec<ValueView>>, Problem> {
+    let Query(query) = query.map_err(bad_query)?;
+    hub.values(&device, &query).map(Json)
+}
+
+/// The active alarms of every device, the gravest first.
+#[utoipa::path(get, path = "/api/v1/alarms", tag = "live", responses((status = OK, body = Vec<AlarmView>, description = "The active alarms")))]
+async fn alarms(State(hub): State<Arc<Hub>>) -> Json<Vec<AlarmView>> {
+    Json(hub.alarms())
+}
+
+/// The wires in the order of the site file.
+#[utoipa::path(get, path = "/api/v1/wires", tag = "site", responses((status = OK, body = Vec<WireView>, description = "The wires")))]
+async fn wires(State(hub): State<Arc<Hub>>) -> Json<Vec<WireView>> {
+    Json(hub.wires())
+}
+
+/// Whose events are wanted.
+#[derive(Debug, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct EventsQuery {
+    /// Only this device.
+    #[param(example = "gen1")]
+    device: Option<String>,
+}
+
+/// What happens, as it happens: server-sent events.
+///
+/// First `snapshot` (`SnapshotEvent`); then `values` (`ValuesEvent`) once a finished poll round of a device,
+/// `device` (`DeviceView`) when a device changed and `alarms` (`AlarmsEvent`) when its active alarms did. A comment
+/// keeps the connection alive each 15 seconds. A reader that falls behind gets a new `snapshot` in place of
+/// the events it missed.
+#[utoipa::path(
+    get, path = "/api/v1/events", operation_id = "events", tag = "live", params(EventsQuery),
+    responses(
+        (status = OK, body = String, content_type = "text/event-stream", description = "The stream"),
+        (status = BAD_REQUEST, body = Problem, content_type = "application/problem+json", description = "The query is not understood"),
+        (status = NOT_FOUND, body = Problem, content_type = "application/problem+json", description = "There is no such device"),
+    ),
+)]
+async fn stream(
+    State(hub): State<Arc<Hub>>,
+    query: Result<Query<EventsQuery>, QueryRejection>,
+) -> Result<Response, Problem> {
+    let Query(query) = query.map_err(bad_query)?;
+    let only = query.device.map(|device| hub.index(&device)).transpose()?;
+    Ok(events::response(hub, only))
+}
+
+/// This document.
+#[utoipa::path(
+    get, path = "/api/v1/openapi.json", tag = "site",
+    responses((status = OK, body = Object, content_type = "application/json", description = "OpenAPI 3.1")),
+)]
+async fn document() -> Response {
+    static DOCUMENT: LazyLock<Vec<u8>> = LazyLock::new(|| serde_json::to_vec(&openapi()).unwrap_or_default());
+    ([(header::CONTENT_TYPE, "application/json")], DOCUMENT.as_slice()).into_response()
+}
+
+/// Whether the gateway runs.
+#[utoipa::path(
+    get, path = "/healthz", tag = "site",
+    responses((status = OK, body = String, content_type = "text/plain", description = "It runs", example = "ok")),
+)]
+async fn healthz() -> &'static str {
+    "ok\n"
+}
+
+fn bad_query(rejection: QueryRejection) -> Problem {
+    Problem::new(StatusCode::BAD_REQUEST, rejection.body_text())
+}

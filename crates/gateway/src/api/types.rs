@@ -1,0 +1,611 @@
+//! The shapes of `/api/v1`: what every answer and every event holds, with its schema.
+//!
+//! These types are the contract of the API and nothing else: they are built from the live state, sent, and
+//! forgotten. `openapi.json` is generated from them, and the page's own types from that file.
+
+use std::borrow::Cow;
+
+use busbar_profile::{self as profile, Number, Shown};
+use serde::Serialize;
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema, SchemaType, Type};
+use utoipa::openapi::{RefOr, schema};
+use utoipa::{PartialSchema, ToSchema};
+
+/// The site, without its devices.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SiteInfo {
+    /// The name the site file gives.
+    #[schema(examples("North hospital"))]
+    pub name: String,
+    /// Version of the gateway.
+    #[schema(examples("0.1.0"))]
+    pub version: String,
+    /// When this gateway started.
+    pub started: Time,
+}
+
+/// The site and every device on it.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SiteView {
+    /// The name the site file gives.
+    #[schema(examples("North hospital"))]
+    pub name: String,
+    /// Version of the gateway.
+    #[schema(examples("0.1.0"))]
+    pub version: String,
+    /// When this gateway started.
+    pub started: Time,
+    /// The devices in the order of the site file.
+    pub devices: Vec<DeviceView>,
+}
+
+/// One controller as it stands now.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct DeviceView {
+    /// Its id in the site file.
+    #[schema(examples("gen1"))]
+    pub id: String,
+    /// Its name in the site file.
+    #[schema(examples("Genset 1"))]
+    pub name: String,
+    /// Key of its profile.
+    #[schema(examples("datakom-d"))]
+    pub profile: String,
+    /// The maker.
+    #[schema(examples("Datakom"))]
+    pub vendor: String,
+    /// What kind of controller it is.
+    pub kind: Kind,
+    /// The model it says it is; null until it has said so, or when it is one the profile does not know.
+    #[schema(required, examples("D-500"))]
+    pub model: Option<String>,
+    /// Id of the wire it is on.
+    #[schema(examples("gen1"))]
+    pub wire: String,
+    /// Its unit id on that wire.
+    #[schema(examples(1))]
+    pub unit: u8,
+    /// True while the device answers, even with an exception.
+    pub online: bool,
+    /// One sentence on what is wrong with reaching the device; null while nothing is.
+    #[schema(
+        required,
+        examples(
+            "Genset 1 cannot be read: unit 1 did not answer within 1s, asked 2 times: check the unit id and that the device is on"
+        )
+    )]
+    pub fault: Option<String>,
+    /// What it is doing; null when it has no such point or when that point is not good now.
+    #[schema(required)]
+    pub state: Option<StateView>,
+    /// The mode it is in; null when it has no such point or when that point is not good now.
+    #[schema(required)]
+    pub mode: Option<ModeView>,
+    /// How many alarms of each class are active.
+    pub alarms: AlarmCounts,
+    /// When it last answered; null before the first answer.
+    #[schema(required)]
+    pub last_seen: Option<Time>,
+}
+
+/// What kind of controller a device is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Runs an engine and generator.
+    Genset,
+    /// Chooses between two sources.
+    TransferSwitch,
+    /// Runs an engine-driven compressor.
+    Compressor,
+}
+
+/// What a device is doing.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct StateView {
+    /// The code in the register.
+    #[schema(examples(12))]
+    pub code: u32,
+    /// The maker's name of that code.
+    #[schema(examples("Genset on load"))]
+    pub label: String,
+    /// The shared word of the vocabulary: `stopped`, `cranking`, `loaded` and so on; null where there is none.
+    #[schema(required, examples("loaded"))]
+    pub canonical: Option<String>,
+    /// Seconds left in this state; null where the device counts none.
+    #[schema(required, value_type = Option<f64>, examples(7))]
+    pub timer_s: Option<Number>,
+}
+
+/// The mode a device is in.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ModeView {
+    /// The code in the register.
+    #[schema(examples(4))]
+    pub code: u32,
+    /// The maker's name of that mode.
+    #[schema(examples("AUTO"))]
+    pub label: String,
+}
+
+/// Active alarms, counted by class.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
+pub struct AlarmCounts {
+    /// The machine is stopped at once.
+    pub shutdown: u32,
+    /// The load is dropped, then the machine stops.
+    pub load_dump: u32,
+    /// A breaker is opened.
+    pub trip: u32,
+    /// Somebody should look.
+    pub warning: u32,
+    /// For information.
+    pub indication: u32,
+}
+
+/// The points of a device, in the groups of its profile.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct PointsView {
+    /// The groups in the order of the profile.
+    pub groups: Vec<GroupView>,
+}
+
+/// One group of points.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct GroupView {
+    /// Its id, unique in the profile.
+    #[schema(examples("genset"))]
+    pub id: String,
+    /// Its heading.
+    #[schema(examples("Genset"))]
+    pub title: String,
+    /// How often its points are read, unless a point says otherwise.
+    pub rate: Rate,
+    /// Its readable points in the order of the profile.
+    pub points: Vec<PointView>,
+}
+
+/// How often a point is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Rate {
+    /// Every second unless the site file says otherwise.
+    Fast,
+    /// Every ten seconds unless the site file says otherwise.
+    Slow,
+    /// Once, and again after the device was away.
+    Once,
+    /// Only while somebody looks.
+    OnDemand,
+}
+
+/// What a point is. It does not change while the gateway runs.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct PointView {
+    /// Its id, unique in the profile.
+    #[schema(examples("genset_l1_voltage"))]
+    pub id: String,
+    /// Its name.
+    #[schema(examples("Genset phase L1 voltage"))]
+    pub name: String,
+    /// Its first register, as the manual prints it (and as it stands on the wire).
+    #[schema(examples(10246))]
+    pub address: u16,
+    /// The same register in the 4xxxx numbers of PLCs: 40001 + address.
+    #[schema(examples(50247))]
+    pub plc: u32,
+    /// How many registers it takes.
+    #[schema(examples(2))]
+    pub registers: u16,
+    /// Its unit; null where it has none or the manual gives none.
+    #[schema(required, examples("V"))]
+    pub unit: Option<String>,
+    /// How its registers are read.
+    #[serde(rename = "type")]
+    pub data_type: PointType,
+    /// How often it is read: its own rate, where that is not its group's.
+    pub rate: Rate,
+    /// Its id in the shared vocabulary.
+    #[schema(required, examples("genset.l1.voltage"))]
+    pub signal: Option<String>,
+    /// What is uncertain about it, where the manual is.
+    #[schema(required, examples("sign"))]
+    pub doubt: Option<String>,
+    /// Page of the manual where it stands.
+    #[schema(required, examples(11))]
+    pub page: Option<u16>,
+    /// The named values of a choice; empty for everything else.
+    pub choices: Vec<ChoiceView>,
+    /// The named bits of a bit array; empty for everything else.
+    pub bits: Vec<BitView>,
+}
+
+/// How a point's registers are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum PointType {
+    /// 8 bits, unsigned.
+    U8,
+    /// 8 bits, two's complement.
+    I8,
+    /// 16 bits, unsigned.
+    U16,
+    /// 16 bits, two's complement.
+    I16,
+    /// 32 bits, unsigned.
+    U32,
+    /// 32 bits, two's complement.
+    I32,
+    /// 16 bits, sign and magnitude.
+    Sm16,
+    /// 24 bits of magnitude and a sign byte.
+    Sm24,
+    /// An array of single bits.
+    Bits,
+    /// An array of two-bit fields.
+    Bits2,
+    /// One of a list of named values.
+    Choice,
+    /// An 8-bit share of full scale.
+    Fraction8,
+    /// A 16-bit share of full scale.
+    Fraction16,
+    /// An array of samples.
+    Trace,
+    /// A picture.
+    Image,
+    /// Opaque bytes.
+    Bytes,
+}
+
+/// One named value of a choice.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ChoiceView {
+    /// The code in the register.
+    #[schema(examples(12))]
+    pub value: u32,
+    /// Its name.
+    #[schema(examples("Genset on load"))]
+    pub label: String,
+}
+
+/// One named bit of a bit array.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct BitView {
+    /// Its number, counted from bit 0 of the first register.
+    #[schema(examples(48))]
+    pub bit: u16,
+    /// Its id, unique in its point.
+    #[schema(examples("genset_low_frequency"))]
+    pub id: String,
+    /// Its name.
+    #[schema(examples("Genset low frequency"))]
+    pub label: String,
+    /// The class of alarm it is; null when it is none.
+    #[schema(required)]
+    pub class: Option<Class>,
+}
+
+/// The class of a bit, the gravest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Class {
+    /// The machine is stopped at once.
+    Shutdown,
+    /// The load is dropped, then the machine stops.
+    LoadDump,
+    /// A breaker is opened.
+    Trip,
+    /// Somebody should look.
+    Warning,
+    /// For information.
+    Indication,
+    /// Not an alarm: something that is so or not so.
+    Status,
+}
+
+/// What a point reads now.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ValueView {
+    /// Id of the point.
+    #[schema(examples("genset_l1_voltage"))]
+    pub id: String,
+    /// The last good value; null when there is none or when the device says that it has none.
+    pub value: PointValue,
+    /// The code behind the label of a choice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, examples(12))]
+    pub code: Option<u32>,
+    /// The numbers of the set bits behind the labels of a bit array.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub set: Option<Vec<u16>>,
+    /// Its unit.
+    #[schema(required, examples("V"))]
+    pub unit: Option<String>,
+    /// How far the value is to be trusted.
+    pub quality: Quality,
+    /// When the value was last read well; null before that.
+    #[schema(required)]
+    pub ts: Option<Time>,
+    /// Why the quality is `bad`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, examples("the device answered exception 2 (illegal address)"))]
+    pub error: Option<String>,
+    /// The registers behind the value; null before the first good read.
+    #[schema(required)]
+    pub raw: Option<Vec<u16>>,
+}
+
+/// How far a value is to be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Quality {
+    /// Read, and not long ago.
+    Good,
+    /// Not read for longer than three times its rate (five seconds at least), or not read yet.
+    Stale,
+    /// The device says that it has no value.
+    Invalid,
+    /// The device answered with an exception, or not at all.
+    Bad,
+}
+
+/// One active alarm.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AlarmView {
+    /// Id of the device.
+    #[schema(examples("gen1"))]
+    pub device: String,
+    /// Id of the point that holds the bit.
+    #[schema(examples("shutdown_alarms"))]
+    pub point: String,
+    /// Number of the bit in its point.
+    #[schema(examples(48))]
+    pub bit: u16,
+    /// Id of the bit; `bit_N` where the profile names none.
+    #[schema(examples("genset_low_frequency"))]
+    pub id: String,
+    /// Its name.
+    #[schema(examples("Genset low frequency"))]
+    pub label: String,
+    /// How grave it is.
+    pub class: Class,
+    /// When the gateway first saw it set.
+    pub since: Time,
+}
+
+/// One wire and how it does.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WireView {
+    /// Its id in the site file.
+    #[schema(examples("gen1"))]
+    pub id: String,
+    /// Where it leads.
+    #[schema(examples("tcp://192.168.1.20:502"))]
+    pub endpoint: String,
+    /// Whether it is connected.
+    pub state: WireState,
+    /// Why it is down; null otherwise.
+    #[schema(
+        required,
+        examples(
+            "tcp://192.168.1.20:502: connection refused: check the port, and that the device is on and takes Modbus connections"
+        )
+    )]
+    pub reason: Option<String>,
+    /// What went over it since the gateway started.
+    pub statistics: WireStatistics,
+}
+
+/// Whether a wire is connected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum WireState {
+    /// Being connected.
+    Connecting,
+    /// Connected.
+    Connected,
+    /// Not connected; tried again by itself.
+    Down,
+}
+
+/// What went over a wire since the gateway started.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct WireStatistics {
+    /// Requests sent, repeats included.
+    pub requests: u64,
+    /// Answers taken, exceptions included.
+    pub answers: u64,
+    /// Requests that nobody answered in time.
+    pub timeouts: u64,
+    /// Exceptions, by code.
+    pub exceptions: Vec<ExceptionCount>,
+    /// Answers that came after their time was up.
+    pub late: u64,
+    /// Frames whose checksum was wrong.
+    pub crc_errors: u64,
+    /// Bytes that belonged to no frame.
+    pub garbage: u64,
+    /// Times the wire was connected again.
+    pub reconnects: u64,
+    /// Bytes received.
+    pub bytes_in: u64,
+    /// Bytes sent.
+    pub bytes_out: u64,
+    /// Mean time from request to answer, in milliseconds; null before the first answer.
+    #[schema(required, examples(3.2))]
+    pub latency_ms: Option<f64>,
+}
+
+/// How often a device answered with one exception code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+pub struct ExceptionCount {
+    /// The code on the wire.
+    #[schema(examples(2))]
+    pub code: u8,
+    /// How often it came.
+    pub count: u64,
+}
+
+/// `event: snapshot`: everything, sent first and again after a reader fell behind.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct SnapshotEvent {
+    /// The site.
+    pub site: SiteInfo,
+    /// The devices asked for, in the order of the site file.
+    pub devices: Vec<DeviceSnapshot>,
+    /// Their active alarms, the gravest first.
+    pub alarms: Vec<AlarmView>,
+}
+
+/// One device in a snapshot.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct DeviceSnapshot {
+    /// The device.
+    pub device: DeviceView,
+    /// Its values, in address order.
+    pub values: Vec<ValueView>,
+}
+
+/// `event: values`: a poll round of one device is finished.
+///
+/// Every point of that device and rate whose quality is `good` was read at `ts`, changed or not.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ValuesEvent {
+    /// Id of the device.
+    #[schema(examples("gen1"))]
+    pub device: String,
+    /// Which of its points were read.
+    pub rate: Rate,
+    /// When the round was finished.
+    pub ts: Time,
+    /// The points whose value or quality changed.
+    pub changed: Vec<ValueView>,
+}
+
+/// `event: alarms`: the active alarms of one device changed.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AlarmsEvent {
+    /// Id of the device.
+    #[schema(examples("gen1"))]
+    pub device: String,
+    /// Its whole list, the gravest first.
+    pub alarms: Vec<AlarmView>,
+}
+
+/// A value as JSON has it: a number, a label, an array of labels or codes, or null.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[serde(untagged)]
+pub enum PointValue {
+    /// No value.
+    #[default]
+    None,
+    /// A number, exact.
+    Number(Number),
+    /// The label of a choice, or hexadecimal bytes.
+    Text(String),
+    /// Labels of the bits that are set.
+    Labels(Vec<String>),
+    /// Codes of two-bit fields, or samples of a trace.
+    Numbers(Vec<Number>),
+}
+
+impl From<Shown<'_>> for PointValue {
+    fn from(shown: Shown<'_>) -> Self {
+        match shown {
+            Shown::Number(number) => Self::Number(number),
+            Shown::Label(label) => Self::Text(label.into_owned()),
+            Shown::Labels(labels) => Self::Labels(labels.into_iter().map(Cow::into_owned).collect()),
+            Shown::Codes(codes) => {
+                Self::Numbers(codes.into_iter().map(|code| i64::from(code).into()).collect())
+            }
+            Shown::Numbers(numbers) => Self::Numbers(numbers),
+            Shown::Hex(hex) => Self::Text(hex),
+            _ => Self::None,
+        }
+    }
+}
+
+impl PartialSchema for PointValue {
+    fn schema() -> RefOr<Schema> {
+        let of = |kind| ObjectBuilder::new().schema_type(kind);
+        let elements = SchemaType::from_iter([Type::String, Type::Number]);
+        RefOr::T(Schema::OneOf(
+            OneOfBuilder::new()
+                .description(Some(
+                    "A number, the label of a choice (or hexadecimal bytes), an array of labels of set bits or of \
+                     codes, or null.",
+                ))
+                .item(of(Type::Number))
+                .item(of(Type::String))
+                .item(ArrayBuilder::new().items(ObjectBuilder::new().schema_type(elements)))
+                .item(of(Type::Null))
+                .examples([serde_json::json!(230.2)])
+                .build(),
+        ))
+    }
+}
+
+impl ToSchema for PointValue {}
+
+/// The API spells the closed word lists itself: its contract must not move with the profile format.
+macro_rules! same_words {
+    ($($name:ident { $($variant:ident),+ $(,)? })+) => {
+        $(impl From<profile::$name> for same_words!(@target $name) {
+            fn from(word: profile::$name) -> Self {
+                match word {
+                    $(profile::$name::$variant => Self::$variant,)+
+                }
+            }
+        })+
+    };
+    (@target DataType) => { PointType };
+    (@target $name:ident) => { $name };
+}
+
+same_words! {
+    Kind { Genset, TransferSwitch, Compressor }
+    Rate { Fast, Slow, Once, OnDemand }
+    Class { Shutdown, LoadDump, Trip, Warning, Indication, Status }
+    Quality { Good, Stale, Invalid, Bad }
+    DataType { U8, I8, U16, I16, U32, I32, Sm16, Sm24, Bits, Bits2, Choice, Fraction8, Fraction16, Trace, Image, Bytes }
+}
+
+/// An instant, printed as RFC 3339 in UTC with milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Time(jiff::Timestamp);
+
+impl Time {
+    /// The instant a clock gave.
+    pub const fn new(timestamp: jiff::Timestamp) -> Self {
+        Self(timestamp)
+    }
+}
+
+impl std::fmt::Display for Time {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.3}", self.0)
+    }
+}
+
+impl Serialize for Time {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl PartialSchema for Time {
+    fn schema() -> RefOr<Schema> {
+        RefOr::T(Schema::Object(
+            ObjectBuilder::new()
+                .schema_type(Type::String)
+                .format(Some(schema::SchemaFormat::KnownFormat(schema::KnownFormat::DateTime)))
+                .description(Some("An instant: RFC 3339, UTC, milliseconds."))
+                .examples([serde_json::json!("2026-11-23T10:15:30.123Z")])
+                .build(),
+        ))
+    }
+}
+
+impl ToSchema for Time {}

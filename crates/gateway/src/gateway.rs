@@ -1,0 +1,145 @@
+//! Starts a site and ends it in good order.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use busbar_link::{Link, OpenError};
+use thiserror::Error;
+use tokio::net::TcpListener;
+use tokio::task::JoinSet;
+use tokio::time::{MissedTickBehavior, interval, timeout};
+
+use crate::device::Device;
+use crate::hub::Hub;
+use crate::poller::Poller;
+use crate::site::{Site, SiteWire};
+use crate::stop::{self, Announcer};
+use crate::{server, wires};
+
+/// How often values are looked at for their age.
+const AGEING: Duration = Duration::from_secs(1);
+
+/// What the caller decides, not the site file.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Where to listen, in place of what the site file says.
+    pub listen: Option<SocketAddr>,
+}
+
+/// Why a gateway did not start. Nothing of it runs then.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum StartError {
+    /// Something listens there already, perhaps another gateway. The caller chooses another port.
+    #[error("{address} is in use by another program: stop it, or listen elsewhere")]
+    AddressInUse {
+        /// The address asked for.
+        address: SocketAddr,
+    },
+    /// This machine does not have that address, or ports below 1024 are not for this user.
+    #[error("cannot listen on {address}: {reason}")]
+    Listen {
+        /// The address asked for.
+        address: SocketAddr,
+        /// The class of the system's error.
+        kind: io::ErrorKind,
+        /// The system's own words.
+        reason: String,
+    },
+    /// A wire that this build cannot speak.
+    #[error("wire {wire}: {source}")]
+    Wire {
+        /// Id of the wire.
+        wire: String,
+        /// Why not.
+        source: OpenError,
+    },
+}
+
+/// A running gateway. Dropped, it ends at once; [`Self::shutdown`] ends it in good order.
+#[derive(Debug)]
+pub struct Gateway {
+    address: SocketAddr,
+    stop: Announcer,
+    tasks: JoinSet<()>,
+}
+
+/// Starts the gateway of a site: opens its wires, polls its devices, and serves the API and the page.
+///
+/// A device or host that cannot be reached does not keep it from starting; the API shows the fault.
+///
+/// # Errors
+///
+/// The address cannot be listened on, or a wire is of a kind that this build does not speak.
+pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> {
+    let listener = listen(options.listen.unwrap_or(site.listen)).await?;
+    let address = listener.local_addr().map_err(|error| refused(site.listen, &error))?;
+    let links = open(&site)?;
+
+    let (stop, stopped) = stop::channel();
+    let devices =
+        site.devices.iter().map(|device| Device::new(device.clone(), site.wires[device.wire].id.clone()));
+    let named = site.wires.iter().map(|wire| wire.id.clone()).zip(links.iter().cloned());
+    let hub = Arc::new(Hub::new(site.name.clone(), devices.collect(), named.collect(), stopped));
+
+    let mut tasks = JoinSet::new();
+    for (index, device) in site.devices.iter().enumerate() {
+        let cost = wires::cost(&site.wires[device.wire].endpoint, device.profile);
+        let link = wires::for_polling(&links[device.wire]);
+        tasks.spawn(Poller::new(Arc::clone(&hub), index, device.clone(), link, cost).run());
+    }
+    tasks.spawn(age(Arc::clone(&hub)));
+    tasks.spawn(server::serve(listener, address, hub));
+    tracing::info!(%address, devices = site.devices.len(), "gateway started");
+    Ok(Gateway { address, stop, tasks })
+}
+
+impl Gateway {
+    /// Where it listens; with the port that the system chose when port 0 was asked for.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Ends polling, tells every reader of the event stream, and returns when nothing of the gateway runs any more.
+    pub async fn shutdown(mut self) {
+        self.stop.announce();
+        let ended = async { while self.tasks.join_next().await.is_some() {} };
+        if timeout(server::FAREWELL + Duration::from_secs(1), ended).await.is_err() {
+            tracing::warn!("some tasks did not end in time and were cut off");
+        }
+        self.tasks.shutdown().await;
+    }
+}
+
+async fn listen(address: SocketAddr) -> Result<TcpListener, StartError> {
+    TcpListener::bind(address).await.map_err(|error| refused(address, &error))
+}
+
+fn refused(address: SocketAddr, error: &io::Error) -> StartError {
+    match error.kind() {
+        io::ErrorKind::AddrInUse => StartError::AddressInUse { address },
+        kind => StartError::Listen { address, kind, reason: error.to_string() },
+    }
+}
+
+fn open(site: &Site) -> Result<Vec<Link>, StartError> {
+    let open = |(index, wire): (usize, &SiteWire)| {
+        wires::open(site, index, wire).map_err(|source| StartError::Wire { wire: wire.id.clone(), source })
+    };
+    site.wires.iter().enumerate().map(open).collect()
+}
+
+/// Looks at the age of every value.
+async fn age(hub: Arc<Hub>) {
+    let mut stop = hub.stop();
+    let mut ticks = interval(AGEING);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        tokio::select! {
+            () = stop.requested() => return,
+            _ = ticks.tick() => hub.expire(),
+        }
+    }
+}

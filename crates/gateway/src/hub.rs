@@ -1,0 +1,297 @@
+//! The live site: what every device and wire shows now, and who is told when it changes.
+//!
+//! Every device has a lock of its own that is held for microseconds and never across an await, so a reader of the
+//! API holds up no poller and one device holds up no other.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use axum::http::StatusCode;
+use busbar_link::Link;
+use busbar_profile::Rate;
+use tokio::sync::broadcast;
+use tokio::time::Instant;
+
+use crate::api::types::{
+    AlarmView, AlarmsEvent, DeviceSnapshot, DeviceView, PointsView, SiteInfo, SiteView, SnapshotEvent, Time,
+    ValueView, ValuesEvent, WireView,
+};
+use crate::api::{Problem, ValuesQuery};
+use crate::device::{Changes, Device, Round, points_view};
+use crate::events::{Event, frame};
+use crate::stop::Stop;
+use crate::wires;
+
+/// The live site.
+#[derive(Debug)]
+pub(crate) struct Hub {
+    info: SiteInfo,
+    devices: Vec<Slot>,
+    wires: Vec<(String, Link)>,
+    events: broadcast::Sender<Arc<Event>>,
+    stop: Stop,
+    origin: Instant,
+}
+
+/// One device behind its lock.
+#[derive(Debug)]
+struct Slot {
+    id: String,
+    points: PointsView,
+    live: Mutex<Live>,
+}
+
+#[derive(Debug)]
+struct Live {
+    device: Device,
+    /// Number of the last event of this device: an event that a snapshot already holds is not sent after it.
+    sequence: u64,
+}
+
+impl Slot {
+    /// A panic under this lock is caught by the task it happened in; what is left is still the last good state.
+    fn lock(&self) -> MutexGuard<'_, Live> {
+        self.live.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Hub {
+    pub(crate) fn new(name: String, devices: Vec<Device>, wires: Vec<(String, Link)>, stop: Stop) -> Self {
+        // Room for the events of a few seconds; a reader that is further behind gets a snapshot, which costs less.
+        let capacity = (devices.len() * 8).clamp(256, 16_384);
+        let slot = |device: Device| Slot {
+            id: device.site().id.clone(),
+            points: points_view(device.site().profile),
+            live: Mutex::new(Live { device, sequence: 0 }),
+        };
+        Self {
+            info: SiteInfo { name, version: env!("CARGO_PKG_VERSION").to_owned(), started: wall_clock() },
+            devices: devices.into_iter().map(slot).collect(),
+            wires,
+            events: broadcast::Sender::new(capacity),
+            stop,
+            origin: Instant::now(),
+        }
+    }
+
+    /// Time since the gateway started: the clock of every poller.
+    pub(crate) fn now(&self) -> Duration {
+        self.origin.elapsed()
+    }
+
+    /// Tells when the gateway is to end.
+    pub(crate) fn stop(&self) -> Stop {
+        self.stop.clone()
+    }
+
+    /// Takes over a finished round of a device and tells who listens.
+    pub(crate) fn finish(&self, device: usize, round: Round) {
+        let (now, ts, rate) = (self.now(), wall_clock(), round.rate);
+        let mut live = self.devices[device].lock();
+        let (was_online, had_fault) = (live.device.is_online(), live.device.fault().map(str::to_owned));
+        let changes = live.device.finish(round, now, ts);
+        note(&live.device, was_online, had_fault.as_deref());
+        self.publish(device, &mut live, &[(rate, ts, changes)]);
+    }
+
+    /// Marks what became too old on any device.
+    pub(crate) fn expire(&self) {
+        for (index, slot) in self.devices.iter().enumerate() {
+            let mut live = slot.lock();
+            let expired = live.device.expire(self.now());
+            if expired.is_empty() {
+                continue;
+            }
+            let at = |live: &Live, rate| live.device.last_read(rate).unwrap_or_else(wall_clock);
+            let events: Vec<_> =
+                expired.into_iter().map(|(rate, changes)| (rate, at(&live, rate), changes)).collect();
+            self.publish(index, &mut live, &events);
+        }
+    }
+
+    fn publish(&self, index: usize, live: &mut Live, rounds: &[(Rate, Time, Changes)]) {
+        live.sequence += 1;
+        if self.events.receiver_count() == 0 {
+            return;
+        }
+        let device = &live.device;
+        let id = &device.site().id;
+        let mut frames = Vec::new();
+        for (rate, ts, changes) in rounds {
+            let changed = changes.values.iter().filter(|point| device.shows(**point));
+            let values = ValuesEvent {
+                device: id.clone(),
+                rate: (*rate).into(),
+                ts: *ts,
+                changed: changed.map(|point| device.value(*point)).collect(),
+            };
+            frame(&mut frames, "values", &values);
+            if changes.alarms {
+                let alarms = AlarmsEvent { device: id.clone(), alarms: device.alarm_views() };
+                frame(&mut frames, "alarms", &alarms);
+            }
+            if changes.device {
+                frame(&mut frames, "device", &device.view());
+            }
+        }
+        // Nobody listening is no error.
+        let _ = self.events.send(Arc::new(Event {
+            device: index,
+            sequence: live.sequence,
+            frames: frames.into(),
+        }));
+    }
+}
+
+/// What the API asks.
+impl Hub {
+    pub(crate) fn site(&self) -> SiteView {
+        let SiteInfo { name, version, started } = self.info.clone();
+        SiteView { name, version, started, devices: self.device_views() }
+    }
+
+    pub(crate) fn device_views(&self) -> Vec<DeviceView> {
+        self.devices.iter().map(|slot| slot.lock().device.view()).collect()
+    }
+
+    pub(crate) fn device_view(&self, id: &str) -> Result<DeviceView, Problem> {
+        Ok(self.slot(id)?.lock().device.view())
+    }
+
+    pub(crate) fn points(&self, id: &str) -> Result<PointsView, Problem> {
+        Ok(self.slot(id)?.points.clone())
+    }
+
+    pub(crate) fn values(&self, id: &str, query: &ValuesQuery) -> Result<Vec<ValueView>, Problem> {
+        let slot = self.slot(id)?;
+        let live = slot.lock();
+        let profile = live.device.site().profile;
+        let group = match &query.group {
+            Some(group) => {
+                Some(profile.groups.iter().position(|known| known.id == *group).ok_or_else(|| {
+                    let known: Vec<&str> = profile.groups.iter().map(|group| group.id.as_str()).collect();
+                    bad_request(format!("{id} has no group {group}; it has {}", known.join(", ")))
+                })?)
+            }
+            None => None,
+        };
+        let named = match &query.point {
+            Some(points) => Some(
+                points
+                    .split(',')
+                    .map(|point| {
+                        profile.point_index(point).ok_or_else(|| {
+                            bad_request(format!("{id} has no point {point}; see /api/v1/devices/{id}/points"))
+                        })
+                    })
+                    .collect::<Result<Vec<usize>, Problem>>()?,
+            ),
+            None => None,
+        };
+        let wanted = |index: &usize| {
+            live.device.shows(*index)
+                && group.is_none_or(|group| profile.points[*index].group == group)
+                && named.as_ref().is_none_or(|named| named.contains(index))
+        };
+        Ok((0..profile.points.len()).filter(wanted).map(|index| live.device.value(index)).collect())
+    }
+
+    pub(crate) fn alarms(&self) -> Vec<AlarmView> {
+        let mut alarms: Vec<AlarmView> =
+            self.devices.iter().flat_map(|slot| slot.lock().device.alarm_views()).collect();
+        gravest_first(&mut alarms);
+        alarms
+    }
+
+    pub(crate) fn wires(&self) -> Vec<WireView> {
+        self.wires.iter().map(|(id, link)| wires::view(id, link)).collect()
+    }
+
+    /// Index of a device.
+    pub(crate) fn index(&self, id: &str) -> Result<usize, Problem> {
+        self.devices.iter().position(|slot| slot.id == id).ok_or_else(|| self.unknown(id))
+    }
+
+    /// Everything as it stands, and how to go on from there: the events that come after it.
+    pub(crate) fn snapshot(&self, only: Option<usize>) -> (SnapshotEvent, Vec<u64>) {
+        let mut snapshot = SnapshotEvent { site: self.info.clone(), devices: Vec::new(), alarms: Vec::new() };
+        let mut sequences = vec![0; self.devices.len()];
+        for (index, slot) in self.devices.iter().enumerate() {
+            if only.is_some_and(|only| only != index) {
+                continue;
+            }
+            let live = slot.lock();
+            sequences[index] = live.sequence;
+            let device = DeviceSnapshot { device: live.device.view(), values: live.device.values() };
+            snapshot.devices.push(device);
+            snapshot.alarms.extend(live.device.alarm_views());
+        }
+        gravest_first(&mut snapshot.alarms);
+        (snapshot, sequences)
+    }
+
+    pub(crate) fn subscribe(&self) -> broadcast::Receiver<Arc<Event>> {
+        self.events.subscribe()
+    }
+
+    fn slot(&self, id: &str) -> Result<&Slot, Problem> {
+        Ok(&self.devices[self.index(id)?])
+    }
+
+    fn unknown(&self, id: &str) -> Problem {
+        let known: Vec<&str> = self.devices.iter().map(|slot| slot.id.as_str()).collect();
+        let detail = match known.as_slice() {
+            [] => format!("there is no device {id}: this site has none"),
+            known => format!("there is no device {id}; this site has {}", known.join(", ")),
+        };
+        Problem::new(StatusCode::NOT_FOUND, detail)
+    }
+}
+
+fn bad_request(detail: String) -> Problem {
+    Problem::new(StatusCode::BAD_REQUEST, detail)
+}
+
+/// Stable: devices stay in the order of the site file among equals.
+fn gravest_first(alarms: &mut [AlarmView]) {
+    alarms.sort_by_key(|alarm| (alarm.class, alarm.since));
+}
+
+/// Into the log what a person would want to find there: a device came, went, or has another fault.
+fn note(device: &Device, was_online: bool, had_fault: Option<&str>) {
+    let id = &device.site().id;
+    match (device.fault(), had_fault) {
+        (Some(fault), had) if had != Some(fault) => tracing::warn!(device = %id, "{fault}"),
+        (None, Some(_)) => tracing::info!(device = %id, "answers again"),
+        (None, None) if !was_online && device.is_online() => tracing::info!(device = %id, "answers"),
+        _ => {}
+    }
+}
+
+fn wall_clock() -> Time {
+    Time::new(jiff::Timestamp::now())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stop;
+    use crate::testing::{answered, hub};
+
+    #[test]
+    fn alarms_of_all_devices_are_listed_the_gravest_first() {
+        let hub = hub(&["gen1", "gen2", "gen3"], stop::channel().1);
+        let alarms = |shutdowns, warnings| answered(Rate::Fast, &[(110, &[shutdowns, warnings])]);
+        hub.finish(0, alarms(0, 1));
+        hub.finish(1, alarms(1, 1));
+        hub.finish(2, alarms(0, 0));
+        let listed = |alarms: &[AlarmView]| {
+            alarms.iter().map(|alarm| (alarm.device.clone(), alarm.point.clone())).collect::<Vec<_>>()
+        };
+        let expected = [("gen2", "shutdowns"), ("gen1", "warnings"), ("gen2", "warnings")];
+        let expected = expected.map(|(device, point)| (device.to_owned(), point.to_owned()));
+        assert_eq!(listed(&hub.alarms()), expected);
+        assert_eq!(listed(&hub.snapshot(None).0.alarms), expected);
+        assert_eq!(listed(&hub.snapshot(Some(0)).0.alarms), expected[1..2]);
+    }
+}

@@ -1,0 +1,30 @@
+//! The service: polling, live state, alarms, the HTTP API and the page.
+//!
+//! [`Site::parse`] reads and checks a site file; [`start`] polls its devices and serves what they say.
+//!
+//! The way of a reading: `poller` asks the wire by `schedule` and `poll_plan`; a finished round goes into `device`,
+//! which keeps registers, values, quality and `alarms` and says what changed; `hub` holds all devices and tells the
+//! readers of `events`. Everything that decides is pure and takes the time as an argument; only `poller`, `events`,
+//! `server` and `gateway` wait for anything.
+
+mod alarms;
+pub mod api;
+mod device;
+mod events;
+mod failure;
+mod gateway;
+mod hub;
+mod page;
+mod poll_plan;
+mod poller;
+mod schedule;
+mod server;
+mod site;
+mod stop;
+#[cfg(test)]
+mod testing;
+mod wires;
+
+pub use crate::api::openapi;
+pub use crate::gateway::{Gateway, Options, StartError, start};
+pub use crate::site::{DEFAULT_LISTEN, Finding, Findings, Poll, Site, SiteDevice, SiteWire};

@@ -1,0 +1,365 @@
+//! The site file: which wires and devices there are. TOML, checked as a whole before anything starts.
+
+mod findings;
+mod reader;
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+use busbar_link::Endpoint;
+use busbar_profile::{Profile, WordOrder};
+use toml::de::DeTable;
+
+use self::findings::Collector;
+pub use self::findings::{Finding, Findings};
+use self::reader::{At, Table};
+
+/// Where the gateway listens unless it is told otherwise: this machine only.
+pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
+
+const TIMEOUT: RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(60);
+const POLL: RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(3600);
+
+/// A site: its wires and the devices on them. Everything in it has been checked.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Site {
+    /// What the page calls it.
+    pub name: String,
+    /// Where the gateway listens.
+    pub listen: SocketAddr,
+    /// The wires, in the order of the file; ids are unique.
+    pub wires: Vec<SiteWire>,
+    /// The devices, in the order of the file; ids are unique.
+    pub devices: Vec<SiteDevice>,
+}
+
+/// One wire of a site.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct SiteWire {
+    /// Its id.
+    pub id: String,
+    /// Where it leads.
+    pub endpoint: Endpoint,
+    /// How long to wait for an answer; none: as long as the profiles of its devices say.
+    pub timeout: Option<Duration>,
+}
+
+/// One device of a site.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct SiteDevice {
+    /// Its id, as the API's addresses have it.
+    pub id: String,
+    /// Its name; the id where the file gives none.
+    pub name: String,
+    /// What it is.
+    pub profile: &'static Profile,
+    /// Index of its wire in [`Site::wires`].
+    pub wire: usize,
+    /// Its unit id on that wire.
+    pub unit: u8,
+    /// Word order of its 32-bit numbers.
+    pub word_order: WordOrder,
+    /// How often it is polled.
+    pub poll: Poll,
+}
+
+/// How often a device is polled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Poll {
+    /// Interval of the fast points.
+    pub fast: Duration,
+    /// Interval of the slow points.
+    pub slow: Duration,
+}
+
+impl Default for Poll {
+    fn default() -> Self {
+        Self { fast: Duration::from_secs(1), slow: Duration::from_secs(10) }
+    }
+}
+
+impl Site {
+    /// Reads and checks a site file.
+    ///
+    /// `file` only serves the findings.
+    ///
+    /// # Errors
+    ///
+    /// Everything that is wrong with the text, with line, column and remedy.
+    pub fn parse(file: &str, text: &str) -> Result<Self, Findings> {
+        let mut findings = Collector::new(file, text);
+        let (root, errors) = DeTable::parse_recoverable(text);
+        for error in errors {
+            findings.add(
+                error.span().unwrap_or(0..0),
+                format!("this is not TOML: {}", error.message().replace('\n', ", ")),
+                "mend the syntax; https://toml.io shows it",
+            );
+        }
+        // After a syntax error the rest of the text means who knows what.
+        findings.finish()?;
+
+        let mut findings = Collector::new(file, text);
+        let site = read(&Table::new("a site file", KEYS, root.get_ref(), 0..0, &mut findings), &mut findings);
+        findings.finish()?;
+        Ok(site)
+    }
+}
+
+const ENDPOINT_HELP: &str = "write an endpoint such as \"tcp://192.168.1.20:502\"";
+const KEYS: &[&str] = &["site", "server", "wires", "devices"];
+const SITE_KEYS: &[&str] = &["name"];
+const SERVER_KEYS: &[&str] = &["listen"];
+const WIRE_KEYS: &[&str] = &["id", "endpoint", "timeout"];
+const DEVICE_KEYS: &[&str] = &["id", "name", "profile", "wire", "unit", "word_order", "poll"];
+const POLL_KEYS: &[&str] = &["fast", "slow"];
+
+/// What stands in for a part that has been reported missing or wrong is never seen: the findings stop it.
+fn read(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Site {
+    let site = root.required("site", "{ name = \"North hospital\" }", findings, |root, key, findings| {
+        root.table(key, "[site]", SITE_KEYS, findings)
+    });
+    let name = site.and_then(|site| {
+        site.required("name", "\"North hospital\"", findings, |site, key, findings| name(site, key, findings))
+    });
+    let listen = root
+        .table("server", "[server]", SERVER_KEYS, findings)
+        .and_then(|server| listen(&server, findings))
+        .unwrap_or(DEFAULT_LISTEN);
+    let wires = wires(root, findings);
+    let devices = devices(root, &wires, findings);
+    Site {
+        name: name.unwrap_or_default(),
+        listen,
+        wires: wires.into_iter().filter_map(|wire| wire.1).collect(),
+        devices,
+    }
+}
+
+fn listen(server: &Table<'_, '_>, findings: &mut Collector<'_>) -> Option<SocketAddr> {
+    let text = server.string("listen", findings)?;
+    let address = text.value.parse().ok();
+    if address.is_none() {
+        findings.add(
+            text.span,
+            format!("`{}` is no address to listen on", text.value),
+            format!(
+                "write an IP address, a colon and a port, such as \"{DEFAULT_LISTEN}\" for this machine only or \
+                 \"0.0.0.0:8080\" for the network"
+            ),
+        );
+    }
+    address
+}
+
+/// The wires by id; one whose id is right but whose endpoint is not still counts as defined.
+fn wires(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<(String, Option<SiteWire>)> {
+    let mut wires: Vec<(String, Option<SiteWire>)> = Vec::new();
+    for table in root.tables("wires", "[[wires]]", WIRE_KEYS, findings) {
+        let id = id(&table, "wire", wires.iter().map(|wire| wire.0.as_str()), findings);
+        let endpoint =
+            table.required("endpoint", "\"tcp://192.168.1.20:502\"", findings, |table, key, findings| {
+                let text = table.string(key, findings)?;
+                match text.value.parse::<Endpoint>() {
+                    Ok(endpoint) => Some(endpoint),
+                    Err(error) => {
+                        // The link's sentences hold the remedy behind the semicolon.
+                        let problem = error.problem.to_string();
+                        let (message, help) = problem.split_once("; ").unwrap_or((&problem, ENDPOINT_HELP));
+                        findings.add(text.span, format!("`{}` is no endpoint: {message}", text.value), help);
+                        None
+                    }
+                }
+            });
+        let timeout = table.duration("timeout", TIMEOUT, findings).map(|timeout| timeout.value);
+        if let Some(id) = id {
+            let wire = endpoint.map(|endpoint| SiteWire { id: id.clone(), endpoint, timeout });
+            wires.push((id, wire));
+        }
+    }
+    wires
+}
+
+fn devices(
+    root: &Table<'_, '_>,
+    wires: &[(String, Option<SiteWire>)],
+    findings: &mut Collector<'_>,
+) -> Vec<SiteDevice> {
+    let mut devices: Vec<SiteDevice> = Vec::new();
+    let mut ids: Vec<String> = Vec::new();
+    for table in root.tables("devices", "[[devices]]", DEVICE_KEYS, findings) {
+        let id = id(&table, "device", ids.iter().map(String::as_str), findings);
+        ids.extend(id.clone());
+        let name = name(&table, "name", findings);
+        let profile = table.required("profile", "\"datakom-d\"", findings, profile);
+        let wire = table
+            .required("wire", "\"gen1\"", findings, |table, key, findings| wire(table, key, wires, findings));
+        let unit =
+            table.required("unit", "1", findings, |table, key, findings| unit(table, key, profile, findings));
+        let word_order = word_order(&table, findings);
+        let poll = poll(&table, findings);
+
+        let (Some(id), Some(profile), Some(wire), Some(unit)) = (id, profile, wire, unit) else { continue };
+        if let Some(other) = devices.iter().find(|other| (other.wire, other.unit) == (wire, unit.value)) {
+            findings.add(
+                unit.span,
+                format!("unit {} on wire {} is {} already", unit.value, wires[wire].0, other.id),
+                "give every device on a wire a unit id of its own",
+            );
+            continue;
+        }
+        devices.push(SiteDevice {
+            name: name.unwrap_or_else(|| id.clone()),
+            id,
+            profile,
+            wire,
+            unit: unit.value,
+            word_order: word_order.unwrap_or(profile.wire.word_order),
+            poll,
+        });
+    }
+    devices
+}
+
+/// An id of something of this `kind`, unlike the `others`.
+fn id<'a>(
+    table: &Table<'_, '_>,
+    kind: &str,
+    mut others: impl Iterator<Item = &'a str>,
+    findings: &mut Collector<'_>,
+) -> Option<String> {
+    let id =
+        table.required("id", "\"gen1\"", findings, |table, key, findings| table.string(key, findings))?;
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if !(1..=64).contains(&id.value.len()) || !id.value.chars().all(allowed) {
+        findings.add(
+            id.span,
+            format!("`{}` cannot be an id", id.value),
+            "write 1 to 64 letters a-z, digits, - and _; `name` takes any text",
+        );
+        return None;
+    }
+    if others.any(|other| other == id.value) {
+        findings.add(
+            id.span,
+            format!("there is a {kind} `{}` already", id.value),
+            format!("give every {kind} an id of its own"),
+        );
+        return None;
+    }
+    Some(id.value)
+}
+
+fn name(table: &Table<'_, '_>, key: &str, findings: &mut Collector<'_>) -> Option<String> {
+    let name = table.string(key, findings)?;
+    let length = name.value.trim().chars().count();
+    if !(1..=200).contains(&length) || name.value.contains(char::is_control) {
+        findings.add(name.span, "this cannot be a name", "write 1 to 200 characters on one line");
+        return None;
+    }
+    Some(name.value.trim().to_owned())
+}
+
+fn profile(table: &Table<'_, '_>, key: &str, findings: &mut Collector<'_>) -> Option<&'static Profile> {
+    let text = table.string(key, findings)?;
+    let profile = busbar_profile::builtin(&text.value);
+    if profile.is_none() {
+        let known: Vec<&str> =
+            busbar_profile::builtins().iter().map(|profile| profile.key.as_str()).collect();
+        findings.add(
+            text.span,
+            format!("there is no profile `{}`", text.value),
+            format!("write one of: {}", known.join(", ")),
+        );
+    }
+    profile
+}
+
+fn wire(
+    table: &Table<'_, '_>,
+    key: &str,
+    wires: &[(String, Option<SiteWire>)],
+    findings: &mut Collector<'_>,
+) -> Option<usize> {
+    let text = table.string(key, findings)?;
+    let index = wires.iter().position(|wire| wire.0 == text.value);
+    if index.is_none() {
+        let help = match wires {
+            [] => format!("define it: [[wires]] with id = \"{}\" and its endpoint", text.value),
+            _ => {
+                let known: Vec<&str> = wires.iter().map(|wire| wire.0.as_str()).collect();
+                format!("write one of: {}; or define it with [[wires]]", known.join(", "))
+            }
+        };
+        findings.add(text.span, format!("the wire `{}` is not defined", text.value), help);
+    }
+    index
+}
+
+fn unit(
+    table: &Table<'_, '_>,
+    key: &str,
+    profile: Option<&Profile>,
+    findings: &mut Collector<'_>,
+) -> Option<At<u8>> {
+    let number = table.integer(key, findings)?;
+    // Without a profile the standard's range is what is left to check.
+    let (min, max, whose) = match profile {
+        Some(profile) => (profile.wire.unit.min, profile.wire.unit.max, profile.key.as_str()),
+        None => (1, 247, "Modbus"),
+    };
+    match u8::try_from(number.value).ok().filter(|unit| (min..=max).contains(unit)) {
+        Some(unit) => Some(At { value: unit, span: number.span }),
+        None => {
+            findings.add(
+                number.span,
+                format!("{whose} knows no unit {}", number.value),
+                format!("write a number from {min} to {max}"),
+            );
+            None
+        }
+    }
+}
+
+fn word_order(table: &Table<'_, '_>, findings: &mut Collector<'_>) -> Option<WordOrder> {
+    let text = table.string("word_order", findings)?;
+    let order = match text.value.as_str() {
+        "low-first" => Some(WordOrder::LowFirst),
+        "high-first" => Some(WordOrder::HighFirst),
+        _ => None,
+    };
+    if order.is_none() {
+        findings.add(
+            text.span,
+            format!("`{}` is no word order", text.value),
+            "write \"low-first\" or \"high-first\"",
+        );
+    }
+    order
+}
+
+fn poll(table: &Table<'_, '_>, findings: &mut Collector<'_>) -> Poll {
+    let mut poll = Poll::default();
+    let Some(table) = table.table("poll", "poll", POLL_KEYS, findings) else { return poll };
+    let fast = table.duration("fast", POLL, findings);
+    let slow = table.duration("slow", POLL, findings);
+    if let (Some(fast), Some(slow)) = (&fast, &slow)
+        && fast.value > slow.value
+    {
+        findings.add(
+            slow.span.clone(),
+            "`slow` is shorter than `fast`",
+            "make `slow` at least as long as `fast`",
+        );
+    }
+    poll.fast = fast.map_or(poll.fast, |fast| fast.value);
+    poll.slow = slow.map_or(poll.slow, |slow| slow.value).max(poll.fast);
+    poll
+}
+
+#[cfg(test)]
+mod tests;

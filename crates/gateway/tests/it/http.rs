@@ -1,0 +1,144 @@
+//! What HTTP clients get that ask for the wrong thing, and how the right one is guarded.
+
+use crate::support::Bench;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_site_is_described() {
+    let bench = Bench::new().await;
+    let site = bench.client.get("/api/v1/site").await.json();
+    assert_eq!((&site["name"], &site["version"]), (&"Bench".into(), &env!("CARGO_PKG_VERSION").into()));
+    assert!(site["started"].is_string());
+    let devices = bench.client.get("/api/v1/devices").await.json();
+    assert_eq!((&site["devices"][0]["id"], &devices[0]["id"]), (&"gen1".into(), &"gen1".into()));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_not_there_is_told_in_a_sentence() {
+    let bench = Bench::new().await;
+    for path in [
+        "/api/v1/devices/gen9",
+        "/api/v1/devices/gen9/points",
+        "/api/v1/devices/gen9/values",
+        "/api/v1/events?device=gen9",
+    ] {
+        let problem = bench.client.get(path).await.problem(404);
+        assert_eq!(problem, "there is no device gen9; this site has gen1", "{path}");
+    }
+    for path in ["/api/v1/nothing", "/api", "/nothing.js", "/../etc/passwd", "/api/v1/devices/gen1/values/1"]
+    {
+        let problem = bench.client.get(path).await.problem(404);
+        assert!(problem.starts_with("there is nothing at /"), "{path}: {problem}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_bad_query_is_told_in_a_sentence() {
+    let bench = Bench::new().await;
+    let values = "/api/v1/devices/gen1/values";
+    for (query, expected) in [
+        ("?group=gen", "gen1 has no group gen; it has state, alarms, "),
+        ("?point=genset_l1_voltage,speed", "gen1 has no point speed; see /api/v1/devices/gen1/points"),
+        ("?points=engine_speed", "Failed to deserialize query string: points: unknown field `points`"),
+    ] {
+        let problem = bench.client.get(&format!("{values}{query}")).await.problem(400);
+        assert!(problem.starts_with(expected), "{query}: {problem}");
+    }
+    bench.client.get("/api/v1/events?devices=gen1").await.problem(400);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn values_can_be_chosen() {
+    let bench = Bench::new().await;
+    let of =
+        async |query: &str| bench.client.get(&format!("/api/v1/devices/gen1/values{query}")).await.json();
+    let all = of("").await;
+    let state = of("?group=state").await;
+    assert_eq!(state.as_array().unwrap().len(), 3);
+    assert!(all.as_array().unwrap().len() > 100);
+    let two = of("?point=unit_mode,genset_l1_voltage").await;
+    assert_eq!(
+        (&two[0]["id"], &two[1]["id"]),
+        (&"genset_l1_voltage".into(), &"unit_mode".into()),
+        "by address"
+    );
+    assert_eq!(of("?group=state&point=genset_l1_voltage").await, serde_json::json!([]));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nothing_can_be_changed() {
+    let bench = Bench::new().await;
+    for method in ["POST", "PUT", "PATCH", "DELETE"] {
+        for path in ["/api/v1/site", "/api/v1/devices/gen1", "/api/v1/events", "/"] {
+            let answer = bench.client.ask(method, path, &[]).await;
+            assert_eq!(answer.problem(405), format!("{path} cannot be used with {method}; use GET"));
+            assert_eq!(answer.header("allow"), "GET,HEAD");
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_answer_is_guarded() {
+    let bench = Bench::new().await;
+    for path in ["/", "/api/v1/site", "/api/v1/nothing", "/healthz"] {
+        let answer = bench.client.get(path).await;
+        let policy = answer.header("content-security-policy");
+        assert!(policy.contains("default-src 'self'") && policy.contains("frame-ancestors 'none'"), "{path}");
+        assert_eq!(answer.header("x-content-type-options"), "nosniff", "{path}");
+        assert_eq!(answer.header("referrer-policy"), "same-origin", "{path}");
+        assert_eq!(answer.header("access-control-allow-origin"), "", "{path}");
+    }
+    assert_eq!(bench.client.get("/api/v1/site").await.header("cache-control"), "no-store");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_page_elsewhere_cannot_rebind_its_name() {
+    let bench = Bench::new().await;
+    let port = bench.gateway.address().port();
+    for host in ["localhost", "127.0.0.1", "[::1]"] {
+        for host in [host.to_owned(), format!("{host}:{port}")] {
+            let answer = bench.client.ask("GET", "/api/v1/site", &[("host", &host)]).await;
+            assert_eq!(answer.status, 200, "{host}");
+        }
+    }
+    for path in ["/", "/api/v1/site", "/healthz"] {
+        let host = format!("evil.example:{port}");
+        let answer = bench.client.ask("GET", path, &[("host", &host)]).await;
+        let problem = answer.problem(421);
+        assert!(problem.contains("was asked for evil.example"), "{problem}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_page_is_served() {
+    let bench = Bench::new().await;
+    let page = bench.client.get("/").await;
+    assert_eq!(page.status, 200);
+    assert_eq!(page.header("content-type"), "text/html");
+    assert!(page.body.contains("<title>"), "{}", page.body);
+    assert!(page.body.contains("Busbar"));
+    assert_eq!(page.header("cache-control"), "no-cache", "a new gateway brings a new page");
+    let small = bench.client.ask("GET", "/", &[("accept-encoding", "br")]).await;
+    assert_eq!(small.header("content-encoding"), "br");
+    let again = bench.client.ask("GET", "/", &[("if-none-match", page.header("etag"))]).await;
+    assert_eq!((again.status.as_u16(), again.body.as_str()), (304, ""));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn answers_are_compressed_for_who_can_read_it() {
+    let bench = Bench::new().await;
+    let path = "/api/v1/devices/gen1/points";
+    let plain = bench.client.get(path).await;
+    let small = bench.client.ask("GET", path, &[("accept-encoding", "gzip, br")]).await;
+    assert_eq!((plain.header("content-encoding"), small.header("content-encoding")), ("", "br"));
+    assert!(small.body.len() * 4 < plain.body.len());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_document_is_served() {
+    let bench = Bench::new().await;
+    let served = bench.client.get("/api/v1/openapi.json").await.json();
+    let generated: serde_json::Value =
+        serde_json::from_str(&busbar_gateway::openapi().to_json().unwrap()).unwrap();
+    assert!(served == generated);
+    assert_eq!(served["openapi"], "3.1.0");
+}

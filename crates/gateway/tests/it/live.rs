@@ -1,0 +1,107 @@
+//! What the device says is what the API shows.
+
+use serde_json::json;
+
+use crate::support::Bench;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn values_appear() {
+    let bench = Bench::new().await;
+    let voltage = bench.until_value("genset_l1_voltage", |value| value["quality"] == "good").await;
+    assert_eq!(voltage["value"], json!(230.2));
+    assert_eq!(voltage["unit"], "V");
+    assert_eq!(voltage["raw"], json!([2302, 0]));
+    let ts = voltage["ts"].as_str().unwrap();
+    assert!(ts.ends_with('Z') && ts.len() == "2026-11-23T10:15:30.123Z".len(), "{ts}");
+
+    let mode = bench.value("unit_mode").await;
+    assert_eq!((&mode["value"], &mode["code"]), (&json!("AUTO"), &json!(4)));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_polled_point_is_read() {
+    let bench = Bench::new().await;
+    bench.until_value("modem_imei", |value| value["quality"] == "good").await;
+    bench.until_value("longitude", |value| value["quality"] == "good").await;
+    bench.until_value("warning_alarms", |value| value["quality"] == "good").await;
+    let values = bench.client.get("/api/v1/devices/gen1/values").await.json();
+    let values = values.as_array().unwrap();
+    assert!(values.len() > 100, "{}", values.len());
+    for value in values {
+        assert!(value["quality"] == "good" || value["quality"] == "invalid", "{value}");
+    }
+    // What is read on demand only is not there until it was, and what cannot be read never is.
+    for absent in ["lcd", "scope", "push_buttons"] {
+        assert!(!values.iter().any(|value| value["id"] == absent), "{absent}");
+    }
+    let most = bench.device.change(|device| device.reads.iter().map(|read| read.1).max());
+    assert_eq!(most, Some(16), "never more than the device allows, and never less than it could");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_device_is_described() {
+    let bench = Bench::with(|device| {
+        device.registers.extend([(10_604, 5), (10_606, 7), (10_605, 2)]);
+    })
+    .await;
+    let view = bench.until_view(|view| view["state"] != json!(null) && view["model"] == "D-500").await;
+    let mut still = view.clone();
+    still["last_seen"] = json!("[instant]");
+    insta::assert_json_snapshot!(still);
+    assert!(view["last_seen"].is_string());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn alarms_are_listed_the_gravest_first() {
+    let bench = Bench::with(|device| {
+        // Bit 48 is bit 0 of the fourth register.
+        device.registers.extend([(10_504 + 3, 1), (10_536, 1 << 5)]);
+    })
+    .await;
+    let view =
+        bench.until_view(|view| view["alarms"]["shutdown"] == 1 && view["alarms"]["warning"] == 1).await;
+    assert_eq!(view["alarms"]["load_dump"], 0);
+    let alarms = bench.client.get("/api/v1/alarms").await.json();
+    let of = |index: usize, key: &str| alarms[index][key].clone();
+    assert_eq!(
+        (of(0, "point"), of(0, "bit"), of(0, "class")),
+        (json!("shutdown_alarms"), json!(48), json!("shutdown"))
+    );
+    assert_eq!((of(0, "device"), of(0, "label")), (json!("gen1"), json!("Genset low frequency")));
+    assert_eq!(
+        (of(1, "point"), of(1, "bit"), of(1, "class")),
+        (json!("warning_alarms"), json!(5), json!("warning"))
+    );
+
+    bench.device.change(|device| device.registers.clear());
+    bench.until_view(|view| view["alarms"]["shutdown"] == 0).await;
+    assert_eq!(bench.client.get("/api/v1/alarms").await.json(), json!([]));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn points_say_where_they_come_from() {
+    let bench = Bench::new().await;
+    let points = bench.client.get("/api/v1/devices/gen1/points").await.json();
+    let all =
+        points["groups"].as_array().unwrap().iter().flat_map(|group| group["points"].as_array().unwrap());
+    let voltage = all.clone().find(|point| point["id"] == "genset_l1_voltage").unwrap();
+    insta::assert_json_snapshot!(voltage);
+    let alarms = all.clone().find(|point| point["id"] == "shutdown_alarms").unwrap();
+    assert_eq!(alarms["bits"][0]["class"], "shutdown");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_wire_counts() {
+    let bench = Bench::new().await;
+    bench.until_view(|view| view["online"] == true).await;
+    let wires = bench.client.get("/api/v1/wires").await.json();
+    let wire = &wires[0];
+    assert_eq!(
+        (&wire["id"], &wire["state"], &wire["reason"]),
+        (&json!("w1"), &json!("connected"), &json!(null))
+    );
+    assert_eq!(wire["endpoint"], format!("tcp://{}", bench.device.address()));
+    let statistics = &wire["statistics"];
+    assert!(statistics["answers"].as_u64().unwrap() > 0 && statistics["latency_ms"].as_f64().unwrap() > 0.0);
+    assert_eq!(statistics["exceptions"], json!([]));
+}

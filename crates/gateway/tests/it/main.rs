@@ -1,0 +1,12 @@
+//! Tests of the gateway from outside: a real controller's answers over TCP come in, HTTP goes out. One module a topic.
+
+// A failed expectation may panic in a test's helpers as it may in the test.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod events;
+mod faults;
+mod http;
+mod live;
+mod openapi;
+mod start;
+mod support;
