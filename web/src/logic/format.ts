@@ -1,0 +1,87 @@
+// Numbers, units and times as text. A number is never rounded: what the gateway sent is what is shown.
+
+/** The digits of a number as JSON carried them: no exponent, no float tail, no grouping. */
+export function numberText(value: number): string {
+  const text = String(value)
+  const match = /^(-?)(\d)(?:\.(\d+))?e([+-]\d+)$/.exec(text)
+  if (!match) return text
+  const [, sign = '', first = '', rest = '', power = '0'] = match
+  const digits = first + rest
+  const point = 1 + Number(power)
+  if (point <= 0) return `${sign}0.${'0'.repeat(-point)}${digits}`
+  return sign + digits.padEnd(point, '0')
+}
+
+/** How many digits stand behind the decimal point. */
+export function decimalsOf(value: number): number {
+  const text = numberText(value)
+  const dot = text.indexOf('.')
+  return dot < 0 ? 0 : text.length - dot - 1
+}
+
+const UNITS: Record<string, string> = {
+  degC: '°C',
+  degF: '°F',
+  deg: '°',
+  ohm: 'Ω',
+  kohm: 'kΩ',
+  m3: 'm³',
+  'm3/h': 'm³/h',
+}
+
+export function unitText(unit: string | null | undefined): string {
+  return unit ? (UNITS[unit] ?? unit) : ''
+}
+
+/** An age in the fewest characters that still tell: `3 s`, `12 min`, `5 h`, `3 d`. */
+export function ageText(ms: number): string {
+  const seconds = Math.max(0, Math.floor(ms / 1000))
+  if (seconds < 60) return `${seconds} s`
+  if (seconds < 3600) return `${Math.floor(seconds / 60)} min`
+  if (seconds < 48 * 3600) return `${Math.floor(seconds / 3600)} h`
+  return `${Math.floor(seconds / 86400)} d`
+}
+
+/** A duration that a person watches: `8 s`, `2 min 05 s`, `3 h 20 min`, `2 d 4 h`. */
+export function durationText(ms: number): string {
+  const seconds = Math.max(0, Math.floor(ms / 1000))
+  const minutes = Math.floor(seconds / 60)
+  const hours = Math.floor(minutes / 60)
+  if (minutes === 0) return `${seconds} s`
+  if (hours === 0) return `${minutes} min ${pad(seconds % 60)} s`
+  if (hours < 48) return `${hours} h ${pad(minutes % 60)} min`
+  return `${Math.floor(hours / 24)} d ${hours % 24} h`
+}
+
+/** What is left of a countdown: `7 s`, `1:07 min`, `1:02:07 h`. */
+export function countdownText(seconds: number): string {
+  const whole = Math.max(0, Math.ceil(seconds))
+  if (whole < 60) return `${whole} s`
+  const minutes = Math.floor(whole / 60)
+  if (minutes < 60) return `${minutes}:${pad(whole % 60)} min`
+  return `${Math.floor(minutes / 60)}:${pad(minutes % 60)}:${pad(whole % 60)} h`
+}
+
+/** Time of day in the reader's zone, with the date in front unless it is today. */
+export function clockText(time: number, now: number): string {
+  const at = new Date(time)
+  const day = `${at.getFullYear()}-${pad(at.getMonth() + 1)}-${pad(at.getDate())}`
+  const clock = `${pad(at.getHours())}:${pad(at.getMinutes())}:${pad(at.getSeconds())}`
+  return at.toDateString() === new Date(now).toDateString() ? clock : `${day} ${clock}`
+}
+
+/** Registers as the manuals and the command line write them: four hex digits each. */
+export function registersText(registers: readonly number[]): string {
+  return registers.map((register) => register.toString(16).toUpperCase().padStart(4, '0')).join(' ')
+}
+
+/** A time stamp of the gateway in milliseconds; undefined when there is none. */
+export function timeOf(stamp: string | null | undefined): number | undefined {
+  if (!stamp) return undefined
+  const time = Date.parse(stamp)
+  return Number.isNaN(time) ? undefined : time
+}
+
+function pad(value: number): string {
+  return String(value).padStart(2, '0')
+}

@@ -1,0 +1,167 @@
+// The whole page in a document of its own, fed by a stream and an answer that the test holds in its hands.
+import { flushSync, mount, unmount } from 'svelte'
+import { afterEach, beforeEach, expect, test, vi } from 'vitest'
+import App from '../App.svelte'
+import { alarm, device, group, point, snapshot, stamp, START, value } from '../logic/samples'
+import type { GroupView, Snapshot } from '../logic/types'
+import { Page } from '../state/page.svelte'
+
+const VOLTS = point('volts', {
+  name: 'Volts',
+  unit: 'V',
+  address: 10246,
+  plc: 50247,
+  registers: 2,
+  page: 11,
+  doubt: 'sign',
+})
+const FLAGS = point('flags', {
+  name: 'Flags',
+  type: 'bits',
+  bits: [
+    { bit: 0, id: 'fuel', label: 'Fuel valve', class: 'status' },
+    { bit: 1, id: 'horn', label: 'Horn', class: 'status' },
+  ],
+})
+
+let emit: (type: string, data?: unknown) => void
+let page: Page
+let app: Record<string, unknown>
+let groups: GroupView[]
+
+async function show(first: Snapshot): Promise<void> {
+  const listeners = new Map<string, (event: { data?: unknown }) => void>()
+  emit = (type, data) => {
+    listeners.get(type)?.({ data: JSON.stringify(data) })
+    flushSync()
+  }
+  vi.stubGlobal('fetch', async () => Response.json({ groups }))
+  page = new Page(() => ({
+    addEventListener: (type, act) => listeners.set(type, act),
+    close: () => undefined,
+  }))
+  page.start()
+  app = mount(App, { target: document.body, props: { page } })
+  emit('snapshot', first)
+  await vi.waitFor(() => expect(document.querySelector('[data-point]')).not.toBeNull())
+  flushSync()
+}
+
+const line = (id: string) => document.querySelector<HTMLElement>(`[data-point="${id}"]`)!
+const text = (element: Element | null) => element?.textContent?.replace(/\s+/g, ' ').trim()
+
+beforeEach(() => {
+  vi.useFakeTimers({ now: START + 2000, toFake: ['Date', 'setTimeout', 'clearTimeout'] })
+  groups = [group('Genset', [VOLTS, FLAGS])]
+})
+
+afterEach(async () => {
+  page.stream.stop()
+  page.clock.stop()
+  await unmount(app)
+  vi.unstubAllGlobals()
+  vi.useRealTimers()
+})
+
+test('a good value stands as it came, with unit and age, and ages each second', async () => {
+  await show(snapshot([{ device: device('gen1'), values: [value('volts', 230.2)] }]))
+  expect(text(line('volts').querySelector('.number'))).toBe('230.2')
+  expect(text(line('volts').querySelector('.unit'))).toBe('V')
+  expect(text(line('volts').querySelector('.age'))).toBe('good, 2 s')
+  vi.advanceTimersByTime(3000)
+  flushSync()
+  expect(text(line('volts').querySelector('.age'))).toBe('good, 5 s')
+  emit('values', { device: 'gen1', rate: 'fast', ts: stamp(5), changed: [] })
+  expect(text(line('volts').querySelector('.age'))).toBe('good, 0 s')
+})
+
+test('a bad value is struck through and says why', async () => {
+  const bad = value('volts', 230.2, { quality: 'bad', error: 'no answer from unit 1 within 1000 ms' })
+  await show(snapshot([{ device: device('gen1'), values: [bad] }]))
+  expect(text(line('volts').querySelector('.struck'))).toBe('230.2')
+  expect(text(line('volts').querySelector('.age'))).toBe('bad, 2 s')
+  expect(document.body.textContent).toContain('Bad: no answer from unit 1 within 1000 ms')
+})
+
+test('the reason is said once: at the device when all of it is gone, else at the group', async () => {
+  const bad = value('volts', 230.2, { quality: 'bad', error: 'connection refused' })
+  const gone = device('gen1', { online: false, fault: 'Genset 1 cannot be read: connection refused' })
+  await show(snapshot([{ device: gone, values: [bad] }]))
+  expect(document.body.textContent?.match(/connection refused/g)).toHaveLength(1)
+  expect(text(document.querySelector('summary'))).toContain('1 bad')
+  emit('device', device('gen1'))
+  expect(text(document.querySelector('.reason'))).toBe('Bad: connection refused')
+})
+
+test('a point that has never been read says so, and has no unit', async () => {
+  const never = value('volts', null, { quality: 'bad', ts: null, error: 'no answer' })
+  await show(snapshot([{ device: device('gen1'), values: [never] }]))
+  expect(text(line('volts').querySelector('.values'))).toBe('never read')
+  expect(line('volts').querySelector('.unit')).toBeNull()
+})
+
+test('an invalid value is no number', async () => {
+  await show(snapshot([{ device: device('gen1'), values: [value('volts', null, { quality: 'invalid' })] }]))
+  expect(text(line('volts').querySelector('.values'))).toBe('no data')
+  expect(line('volts').querySelector('.unit')).toBeNull()
+})
+
+test('address and number come on request, by a button', async () => {
+  await show(snapshot([{ device: device('gen1'), values: [value('volts', 230.2, { raw: [2302, 0] })] }]))
+  const button = line('volts').querySelector('button')!
+  expect(button.getAttribute('aria-expanded')).toBe('false')
+  expect(text(line('volts').querySelector('dl'))).toBeUndefined()
+  button.click()
+  flushSync()
+  expect(button.getAttribute('aria-expanded')).toBe('true')
+  const details = text(document.getElementById(button.getAttribute('aria-controls')!))
+  for (const fact of ['10246 · 50247 · 2 registers', 'volts (u16)', '08FE 0000', 'page 11', 'sign']) {
+    expect(details).toContain(fact)
+  }
+})
+
+test('a bit array shows the labels of the bits that are set', async () => {
+  await show(snapshot([{ device: device('gen1'), values: [value('flags', ['Horn'], { set: [1] })] }]))
+  expect(text(line('flags').querySelector('.values'))).toBe('Horn')
+  emit('values', { device: 'gen1', rate: 'fast', ts: stamp(3), changed: [value('flags', [], { set: [] })] })
+  expect(text(line('flags').querySelector('.values'))).toBe('none set')
+})
+
+test('alarms are listed by class and said politely', async () => {
+  await show(snapshot([{ device: device('gen1'), values: [] }]))
+  expect(document.querySelector('.alarms')?.textContent).toContain('none')
+  emit('alarms', { device: 'gen1', alarms: [alarm('gen1', 58, 'warning'), alarm('gen1', 54, 'shutdown')] })
+  expect([...document.querySelectorAll('.alarms h4')].map(text)).toEqual(['Shutdown', 'Warning'])
+  expect(text(document.querySelector('[aria-live="polite"]'))).toBe('Warning: Alarm 58. Shutdown: Alarm 54.')
+})
+
+test('a lost connection is told, and every value turns stale', async () => {
+  await show(snapshot([{ device: device('gen1'), values: [value('volts', 230.2)] }]))
+  emit('error')
+  expect(text(document.querySelector('[role="alert"]'))).toContain('No connection to the gateway.')
+  expect(text(line('volts').querySelector('.age'))).toBe('stale, 2 s')
+  expect(text(document.querySelector('.summary'))).toContain('Not known')
+  vi.advanceTimersByTime(1500)
+  emit('snapshot', snapshot([{ device: device('gen1'), values: [value('volts', 231)] }]))
+  expect(text(document.querySelector('[role="alert"]'))).toBe('')
+  expect(text(line('volts').querySelector('.number'))).toBe('231')
+})
+
+test('a device that does not answer says so in its own sentence', async () => {
+  const fault = 'Genset 1 does not answer: no answer from unit 1 within 1000 ms'
+  await show(snapshot([{ device: device('gen1', { online: false, fault }), values: [] }]))
+  expect(text(document.querySelector('.fault'))).toBe(fault)
+  expect(text(document.querySelector('.summary'))).toContain('Not answering')
+})
+
+test('the countdown runs between two rounds and stands still with the device', async () => {
+  const state = { code: 5, label: 'Cranking', canonical: 'cranking', timer_s: 67 }
+  await show(snapshot([{ device: device('gen1', { state }), values: [] }]))
+  emit('values', { device: 'gen1', rate: 'fast', ts: stamp(2), changed: [] })
+  expect(text(document.querySelector('.summary'))).toContain('1:07 min')
+  vi.advanceTimersByTime(2000)
+  flushSync()
+  expect(text(document.querySelector('.summary'))).toContain('1:05 min')
+  emit('values', { device: 'gen1', rate: 'fast', ts: stamp(4), changed: [] })
+  expect(text(document.querySelector('.summary'))).toContain('1:07 min')
+})
