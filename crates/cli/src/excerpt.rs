@@ -1,0 +1,93 @@
+//! Mistakes in files, shown where they stand: file, line, column, the source underlined, and what to write instead.
+
+use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
+
+/// One mistake in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Excerpt {
+    /// `file:line:column: what is wrong`.
+    pub(crate) sentence: String,
+    /// What to write instead.
+    pub(crate) help: String,
+    /// Where it stands in the text, in bytes.
+    pub(crate) offset: usize,
+    pub(crate) length: usize,
+}
+
+/// The mistakes of one file.
+#[derive(Debug)]
+pub(crate) struct Excerpts {
+    source: NamedSource<String>,
+    excerpts: Vec<Excerpt>,
+}
+
+impl Excerpts {
+    pub(crate) fn new(file: &str, text: String, excerpts: Vec<Excerpt>) -> Self {
+        Self { source: NamedSource::new(file, text), excerpts }
+    }
+
+    /// All mistakes, one under the other.
+    pub(crate) fn render(&self, coloured: bool) -> String {
+        let theme = if coloured { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
+        let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false).with_context_lines(1);
+        let mut text = String::new();
+        for excerpt in &self.excerpts {
+            if !text.is_empty() {
+                text.push('\n');
+            }
+            let shown = Shown { excerpt, source: &self.source };
+            // The sentence alone still says everything if the excerpt cannot be drawn.
+            if handler.render_report(&mut text, &shown).is_err() {
+                text.push_str(&format!("{}; {}\n", excerpt.sentence, excerpt.help));
+            }
+        }
+        text
+    }
+}
+
+/// An excerpt with its source, as miette wants it.
+#[derive(Debug)]
+struct Shown<'a> {
+    excerpt: &'a Excerpt,
+    source: &'a NamedSource<String>,
+}
+
+impl std::fmt::Display for Shown<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.excerpt.sentence)
+    }
+}
+
+impl std::error::Error for Shown<'_> {}
+
+impl Diagnostic for Shown<'_> {
+    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
+        (!self.excerpt.help.is_empty()).then(|| Box::new(&self.excerpt.help) as Box<dyn std::fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        Some(self.source)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let span = LabeledSpan::new(None, self.excerpt.offset, self.excerpt.length);
+        Some(Box::new(std::iter::once(span)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn underlines_the_mistake() {
+        let text = "[site]\nname = \"North\"\ncolour = \"red\"\n".to_owned();
+        let excerpt = Excerpt {
+            sentence: "site.toml:3:1: unknown key \"colour\"".to_owned(),
+            help: "write one of name".to_owned(),
+            offset: 22,
+            length: 6,
+        };
+        insta::assert_snapshot!(Excerpts::new("site.toml", text, vec![excerpt]).render(false));
+    }
+}

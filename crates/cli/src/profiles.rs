@@ -1,0 +1,119 @@
+//! Which profile a KEY means: one that is compiled in, or a file.
+
+use std::{fs, ops::Deref, path::Path};
+
+use busbar_profile::{Findings, Point, Profile, builtin, builtins};
+
+use crate::{
+    excerpt::{Excerpt, Excerpts},
+    failure::Failure,
+};
+
+/// A profile, wherever it came from.
+#[derive(Debug)]
+pub(crate) enum Resolved {
+    Builtin(&'static Profile),
+    File(Box<Profile>),
+}
+
+impl Deref for Resolved {
+    type Target = Profile;
+
+    fn deref(&self) -> &Profile {
+        match self {
+            Self::Builtin(profile) => profile,
+            Self::File(profile) => profile,
+        }
+    }
+}
+
+/// The profile that KEY names: a path when it holds a slash or ends in `.toml`, else a built-in one.
+pub(crate) fn resolve(key: &str) -> Result<Resolved, Failure> {
+    if key.contains('/') || key.ends_with(".toml") {
+        return load(Path::new(key)).map(|profile| Resolved::File(Box::new(profile)));
+    }
+    builtin(key).map(Resolved::Builtin).ok_or_else(|| {
+        let keys: Vec<&str> = builtins().iter().map(|profile| profile.key.as_str()).collect();
+        Failure::Call(format!(
+            "there is no profile \"{key}\"; the built-in ones are {}, and a profile of your own is given as a path (./{key}.toml)",
+            keys.join(", ")
+        ))
+    })
+}
+
+/// The model that the identity point's registers name, where `registers` has them.
+pub(crate) fn model<'a, 'r>(
+    profile: &'a Profile,
+    registers: impl FnOnce(&Point) -> Option<&'r [u16]>,
+) -> Option<&'a str> {
+    let identity = profile.points.get(profile.identity.as_ref()?.point)?;
+    let code = identity.raw_code(registers(identity)?, profile.wire.word_order)?;
+    profile.model(u16::try_from(code).ok()?)
+}
+
+/// The readable points of these ids as indexes in address order; KEY as the caller wrote it.
+pub(crate) fn points(profile: &Profile, ids: &[String], key: &str) -> Result<Vec<usize>, Failure> {
+    let mut indexes = ids.iter().map(|id| readable(profile, id, key)).collect::<Result<Vec<_>, _>>()?;
+    indexes.sort_unstable();
+    indexes.dedup();
+    Ok(indexes)
+}
+
+fn readable(profile: &Profile, id: &str, key: &str) -> Result<usize, Failure> {
+    let Some((index, point)) =
+        profile.point_index(id).and_then(|index| Some((index, profile.points.get(index)?)))
+    else {
+        let like: Vec<&str> = profile
+            .points
+            .iter()
+            .filter(|point| !id.is_empty() && point.id.contains(id))
+            .map(|point| point.id.as_str())
+            .take(3)
+            .collect();
+        let remedy = match like.as_slice() {
+            [] => format!("\"busbar profile show {key}\" lists them"),
+            like => format!("did you mean {}?", like.join(", ")),
+        };
+        return Err(Failure::Call(format!("{} has no point \"{id}\"; {remedy}", profile.key)));
+    };
+    if !point.access.is_readable() {
+        return Err(Failure::Call(format!(
+            "{id} of {} can be written and not read; leave it out",
+            profile.key
+        )));
+    }
+    Ok(index)
+}
+
+/// Reads and checks a profile file.
+pub(crate) fn load(path: &Path) -> Result<Profile, Failure> {
+    let text = read(path, "profile file")?;
+    let name = path.display().to_string();
+    match Profile::parse(&name, &text) {
+        Ok(profile) => Ok(profile),
+        Err(findings) => Err(Failure::Findings(Box::new(excerpts(&name, text, &findings)))),
+    }
+}
+
+/// The text of a file that the caller named.
+pub(crate) fn read(path: &Path, what: &str) -> Result<String, Failure> {
+    fs::read_to_string(path).map_err(|error| {
+        Failure::Failed(format!(
+            "{what} {} cannot be read: {error}; check the path and that you may read it",
+            path.display()
+        ))
+    })
+}
+
+pub(crate) fn excerpts(file: &str, text: String, findings: &Findings) -> Excerpts {
+    let excerpts = findings
+        .iter()
+        .map(|finding| Excerpt {
+            sentence: format!("{}:{}:{}: {}", finding.file, finding.line, finding.column, finding.message),
+            help: finding.help.clone(),
+            offset: finding.offset,
+            length: finding.length,
+        })
+        .collect();
+    Excerpts::new(file, text, excerpts)
+}

@@ -1,0 +1,253 @@
+//! `emulate`, `run` and `demo`: where they say they are, how they end, and what keeps them from starting.
+
+use std::{
+    io::{Read, Write},
+    net::{TcpListener, TcpStream},
+    process::Stdio,
+    time::{Duration, Instant},
+};
+
+use serde_json::{Value, json};
+
+use crate::support::{Service, busbar, call, command, d500, without_folder, write};
+
+/// One HTTP request, answered in full.
+fn get(page: &str, path: &str) -> String {
+    let address = page.trim_start_matches("http://").trim_end_matches('/');
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    write!(stream, "GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer
+}
+
+/// The JSON body of an answer, however it was cut into chunks.
+fn body(answer: &str) -> Value {
+    let (start, end) = (answer.find(['{', '[']).unwrap(), answer.rfind(['}', ']']).unwrap());
+    serde_json::from_str(&answer[start..=end]).unwrap_or_else(|error| panic!("{error}: {answer}"))
+}
+
+fn free_port() -> (TcpListener, u16) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    (listener, port)
+}
+
+fn site(url: &str) -> String {
+    format!(
+        "[site]\nname = \"Test site\"\n\n[[wires]]\nid = \"w1\"\nendpoint = \"{url}\"\n\n\
+         [[devices]]\nid = \"gen1\"\nprofile = \"datakom-d\"\nwire = \"w1\"\nunit = 1\n"
+    )
+}
+
+#[test]
+fn emulate_prints_every_bound_url_first() {
+    let mut service = Service::start(
+        "emulate datakom-d --listen tcp://127.0.0.1:0 tcp://127.0.0.1:0 --listen tcp://127.0.0.1:0"
+            .split(' '),
+    );
+    let urls = [service.line(), service.line(), service.line()];
+    for url in &urls {
+        assert!(!url.ends_with(":0"));
+        busbar(&format!("registers {url} 10609 1")).ok();
+    }
+    assert_eq!(service.signal("INT"), (Some(0), String::new()));
+}
+
+#[test]
+fn emulate_has_one_json_document() {
+    let mut service = Service::start("emulate datakom-d --listen tcp://127.0.0.1:0 --json".split(' '));
+    let line: Value = serde_json::from_str(&service.line()).unwrap();
+    let url = line["urls"][0].as_str().unwrap();
+    busbar(&format!("registers {url} 10609 1")).ok();
+}
+
+#[test]
+fn emulate_takes_model_and_unit() {
+    let mut service =
+        Service::start("emulate datakom-d --listen tcp://127.0.0.1:0 --unit 9 --model D-700".split(' '));
+    let url = service.line();
+    let registers = busbar(&format!("registers {url} 10609 1 --unit 9 --json")).ok().json();
+    assert_eq!(registers["registers"], json!([0xD700]));
+}
+
+#[test]
+fn a_taken_port_is_one_sentence_and_status_1() {
+    let (_taken, port) = free_port();
+    let folder = tempfile::tempdir().unwrap();
+    let config = write(folder.path(), "site.toml", &site("tcp://127.0.0.1:1"));
+    busbar(&format!("emulate datakom-d --listen tcp://127.0.0.1:{port}"))
+        .fails()
+        .prints("")
+        .says_in_one_sentence(&format!("127.0.0.1:{port}"));
+    busbar(&format!("demo --listen 127.0.0.1:{port}"))
+        .fails()
+        .prints("")
+        .says_in_one_sentence(&format!("127.0.0.1:{port}"));
+    call(["run", "--config", &config, "--listen", &format!("127.0.0.1:{port}")])
+        .fails()
+        .prints("")
+        .says_in_one_sentence(&format!("127.0.0.1:{port}"));
+}
+
+#[test]
+fn demo_shows_a_site_that_lives() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    let mut service =
+        Service::start(["demo", "--listen", "127.0.0.1:0", "--json", "--data", &data.display().to_string()]);
+    let shown: Value = serde_json::from_str(&service.line()).unwrap();
+    let controller = &shown["controllers"][0];
+    assert_eq!(
+        (&controller["profile"], &controller["model"], &controller["unit"]),
+        (&json!("datakom-d"), &json!("D-500"), &json!(1))
+    );
+
+    // By hand, on the wire.
+    busbar(&format!("read datakom-d --from {} fuel_level", controller["endpoint"].as_str().unwrap())).ok();
+
+    // And through the gateway, as soon as its first poll is done.
+    let page = shown["page"].as_str().unwrap();
+    let deadline = Instant::now() + Duration::from_secs(30);
+    loop {
+        let device = body(&get(page, "/api/v1/devices"))[0].clone();
+        if device["online"] == json!(true) {
+            break;
+        }
+        assert!(Instant::now() < deadline, "never online: {device}");
+    }
+    assert!(get(page, "/").starts_with("HTTP/1.1 200"));
+    let (status, err) = service.signal("INT");
+    assert_eq!(status, Some(0), "{err}");
+    assert!(!data.exists(), "nothing is kept yet, so nothing is created");
+}
+
+#[test]
+fn demo_tells_people_where_to_look() {
+    let mut service = Service::start("demo --listen 127.0.0.1:0".split(' '));
+    let text = service.lines_to("Ctrl-C");
+    assert!(text.contains("page        http://127.0.0.1:"), "{text}");
+    assert!(text.contains("busbar read datakom-d --from tcp://127.0.0.1:"), "{text}");
+    let (status, err) = service.signal("TERM");
+    assert_eq!((status, err.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn two_demonstrations_do_not_collide() {
+    let mut one = Service::start("demo --listen 127.0.0.1:0 --json".split(' '));
+    let mut two = Service::start("demo --listen 127.0.0.1:0 --json".split(' '));
+    let endpoint =
+        |line: &str| serde_json::from_str::<Value>(line).unwrap()["controllers"][0]["endpoint"].clone();
+    assert_ne!(endpoint(&one.line()), endpoint(&two.line()));
+}
+
+#[test]
+fn run_serves_a_site_and_shows_a_dead_wire_as_a_fault() {
+    let (_device, url) = d500("");
+    let folder = tempfile::tempdir().unwrap();
+    let dead = format!(
+        "{}\n[[wires]]\nid = \"w2\"\nendpoint = \"tcp://127.0.0.1:1\"\n\n\
+         [[devices]]\nid = \"gen2\"\nprofile = \"datakom-d\"\nwire = \"w2\"\nunit = 1\n",
+        site(&url)
+    );
+    let config = write(folder.path(), "site.toml", &dead);
+    let mut service = Service::start(["run", "--config", &config, "--listen", "127.0.0.1:0", "--json"]);
+    let shown: Value = serde_json::from_str(&service.line()).unwrap();
+    assert_eq!((&shown["site"], &shown["devices"]), (&json!("Test site"), &json!(2)));
+    let page = shown["page"].as_str().unwrap();
+    let deadline = Instant::now() + Duration::from_secs(30);
+    loop {
+        let devices = body(&get(page, "/api/v1/devices"));
+        if devices[0]["online"] == json!(true) && devices[1]["fault"].is_string() {
+            assert_eq!(devices[1]["online"], json!(false));
+            break;
+        }
+        assert!(Instant::now() < deadline, "{devices}");
+    }
+    assert_eq!(service.signal("INT").0, Some(0));
+}
+
+#[test]
+fn mistakes_in_a_site_file_start_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let right = site("tcp://127.0.0.1:1");
+    for (name, from, to) in [
+        ("unknown_key", "unit = 1", "unit_id = 1"),
+        ("wrong_type", "unit = 1", "unit = \"1\""),
+        ("unit_out_of_range", "unit = 1", "unit = 241"),
+        ("unknown_profile", "profile = \"datakom-d\"", "profile = \"datakom-x\""),
+        ("unknown_wire", "wire = \"w1\"", "wire = \"w2\""),
+        ("bad_endpoint", "tcp://127.0.0.1:1", "127.0.0.1:1"),
+        ("no_toml", "[site]", "[site"),
+    ] {
+        assert!(right.contains(from));
+        let config = write(folder.path(), "site.toml", &right.replace(from, to));
+        let call = call(["run", "--config", &config, "--listen", "127.0.0.1:0"])
+            .fails()
+            .prints("")
+            .mentions("site.toml:");
+        insta::assert_snapshot!(format!("site_{name}"), without_folder(&call.err(), folder.path()));
+    }
+}
+
+#[test]
+fn a_missing_site_file_is_one_sentence() {
+    busbar("run --config /nonexistent/site.toml")
+        .fails()
+        .prints("")
+        .says_in_one_sentence("/nonexistent/site.toml cannot be read");
+}
+
+#[test]
+fn the_sample_site_file_is_right() {
+    let sample = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/site.toml");
+    let (_taken, port) = free_port();
+    // The port is taken, so the file is checked and nothing is asked of the addresses in it.
+    call(["run", "--config", sample, "--listen", &format!("127.0.0.1:{port}")])
+        .fails()
+        .says_in_one_sentence(&format!("127.0.0.1:{port}"));
+}
+
+#[test]
+fn ctrl_c_ends_a_waiting_read_with_0() {
+    // A peer that takes the connection and says nothing: the read waits for an hour.
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("tcp://{}", listener.local_addr().unwrap());
+    let service = Service::start(["registers", &url, "0", "1", "--timeout", "3600s"]);
+    let (mut stream, _) = listener.accept().unwrap();
+    // The request is there, so the signal is caught by now.
+    stream.read_exact(&mut [0; 12]).unwrap();
+    let (status, err) = service.signal("INT");
+    assert_eq!((status, err.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn a_closed_pipe_is_no_error() {
+    // More than a pipe holds, so that the writer is still at it when the reader goes.
+    for arguments in ["profile show datakom-d --json", "profile show datakom-d"] {
+        let mut child = command()
+            .args(arguments.split(' '))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let done = child.wait_with_output().unwrap();
+        assert_eq!(
+            (done.status.code(), String::from_utf8_lossy(&done.stderr).as_ref()),
+            (Some(0), ""),
+            "{arguments}"
+        );
+    }
+    assert!(busbar("profile show datakom-d --json").ok().out().len() > 65_536);
+}
+
+#[test]
+fn a_full_disk_is_one_sentence() {
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let done = command().args(["profile", "list"]).stdout(full).output().unwrap();
+    assert_eq!(done.status.code(), Some(1));
+    let err = String::from_utf8_lossy(&done.stderr);
+    assert!(err.contains("standard output cannot be written") && err.lines().count() == 1, "{err}");
+}
