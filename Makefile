@@ -1,0 +1,63 @@
+# Everything a person or CI does with the project: `make demo` shows it, `make test` proves it.
+
+BUSBAR := target/debug/busbar
+CARGO := cargo
+NPM := npm --prefix web --no-audit --no-fund
+
+.PHONY: demo test bench setup web build lint test-web test-rust test-interop test-page clean
+
+## a whole site on this machine: an imitated controller, the gateway, the page
+demo: build
+	$(BUSBAR) demo
+
+## every test, with what it needs installed first
+test: setup lint test-web test-rust test-interop test-page
+
+## figures: processor time, beside a bare C echo and other libraries in the same run
+bench:
+	$(CARGO) run --locked --release -p busbar-bench
+
+setup: web/node_modules/.installed .venv/.installed
+	scripts/setup
+
+web/node_modules/.installed: web/package-lock.json
+	$(NPM) ci
+	touch $@
+
+.venv/.installed: tests/interop/requirements.txt
+	python3 -m venv .venv
+	.venv/bin/pip install --quiet --disable-pip-version-check -r tests/interop/requirements.txt
+	touch $@
+
+## the page, as the binary carries it
+web: web/dist/index.html
+
+web/dist/index.html: web/node_modules/.installed $(shell find web/src web/public web/index.html web/vite.config.ts -type f 2>/dev/null)
+	$(NPM) run build
+
+build: web
+	$(CARGO) build --locked
+
+lint: web
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
+	$(NPM) run lint
+	$(NPM) run check
+
+test-web: web
+	$(NPM) run api:check
+	$(NPM) run size
+	$(NPM) test
+
+test-rust: web
+	$(CARGO) test --locked --workspace
+
+test-interop: build .venv/.installed
+	.venv/bin/python -m pytest -q tests/interop
+
+test-page: build
+	$(NPM) run e2e
+
+clean:
+	$(CARGO) clean
+	rm -rf web/dist web/node_modules .venv
