@@ -1,0 +1,32 @@
+//! How fast the house is, beside bare C and its peers in the same run.
+//!
+//! Absolute figures vary from run to run and from machine to machine: compare ratios only.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its table")]
+
+mod peers;
+mod process;
+mod wire;
+
+use std::process::ExitCode;
+
+const USAGE: &str = "\
+usage: busbar-bench wire [--rounds N] [--seconds S]
+  wire    processor time a request of client and server, beside a bare C program and tokio-modbus";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let result = match arguments.as_slice() {
+        ["wire", options @ ..] => wire::run(options),
+        // How the bench starts its peers: each is a process of its own, so that its processor time is its own.
+        ["peer", role @ ..] => peers::run(role),
+        _ => Err(USAGE.into()),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
