@@ -1,10 +1,25 @@
 //! Child processes: started, listened to, and the processor time they have used.
 
 use std::error::Error;
+use std::ffi::OsStr;
 use std::fs;
 use std::io::{BufRead, BufReader, Lines};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
+
+/// A command that runs `program` on one processor only, the same for every peer.
+///
+/// Client and server then take turns, so that what is counted is their work and not the waking of idle processors,
+/// which costs several times as much and is different each time.
+pub(crate) fn on_one_processor(program: impl AsRef<OsStr>) -> Result<Command, Box<dyn Error>> {
+    let status = fs::read_to_string("/proc/self/status")?;
+    let allowed = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
+    let processors = allowed.ok_or("no list of allowed processors")?.trim();
+    let last = processors.rsplit([',', '-']).next().unwrap_or(processors);
+    let mut command = Command::new("taskset");
+    command.args(["--cpu-list", last]).arg(program);
+    Ok(command)
+}
 
 /// A child that is killed when it is dropped.
 pub(crate) struct Process {

@@ -87,12 +87,10 @@ impl FromStr for Endpoint {
                 });
             };
             match scheme.to_ascii_lowercase().as_str() {
-                "tcp" => Ok(authority(rest, MODBUS_PORT).map(|(host, port)| Self::Tcp { host, port })?),
+                "tcp" => authority(rest, MODBUS_PORT).map(|(host, port)| Self::Tcp { host, port }),
                 "rtu" => Self::serial(rest),
-                "rtu+tcp" => {
-                    Ok(authority(rest, MODBUS_PORT).map(|(host, port)| Self::RtuTcp { host, port })?)
-                }
-                "tls" => Ok(authority(rest, SECURE_PORT).map(|(host, port)| Self::Tls { host, port })?),
+                "rtu+tcp" => authority(rest, MODBUS_PORT).map(|(host, port)| Self::RtuTcp { host, port }),
+                "tls" => authority(rest, SECURE_PORT).map(|(host, port)| Self::Tls { host, port }),
                 _ => Err(EndpointProblem::UnknownScheme { scheme: scheme.into() }),
             }
         };
@@ -326,9 +324,9 @@ fn authority(text: &str, default_port: u16) -> Result<(String, u16), EndpointPro
         return Err(EndpointProblem::TrailingText { rest: rest.into() });
     }
 
+    let bad = || EndpointProblem::BadHost { host: authority.into() };
     let (host, port) = match authority.strip_prefix('[') {
         Some(inner) => {
-            let bad = || EndpointProblem::BadHost { host: authority.into() };
             let (literal, after) = inner.split_once(']').ok_or_else(bad)?;
             let address: Ipv6Addr = literal.parse().map_err(|_| bad())?;
             let port = match after {
@@ -337,16 +335,12 @@ fn authority(text: &str, default_port: u16) -> Result<(String, u16), EndpointPro
             };
             (address.to_string(), port)
         }
-        None => {
-            let (host, port) = match authority.split_once(':') {
-                Some((host, port)) => (host, Some(port)),
-                None => (authority, None),
-            };
-            if authority.parse::<Ipv6Addr>().is_ok() {
-                return Err(EndpointProblem::BadHost { host: authority.into() });
-            }
-            (name(host)?, port)
-        }
+        // Without brackets its last group would pass for a port.
+        None if authority.parse::<Ipv6Addr>().is_ok() => return Err(bad()),
+        None => match authority.split_once(':') {
+            Some((host, port)) => (name(host)?, Some(port)),
+            None => (name(authority)?, None),
+        },
     };
 
     let port = match port {

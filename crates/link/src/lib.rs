@@ -1,8 +1,8 @@
 //! Transports, and the one task that owns a wire.
 //!
-//! A [`Link`] is a handle on one wire; the task behind it is the only one that touches the connection. Whoever wants
-//! something of a device asks the link, so two users of one wire cannot collide. The task connects at once and again
-//! after a drop, sends one request at a time, and takes nothing for an answer that does not answer that request.
+//! A [`Link`] is a handle on one wire, and one task behind it owns the connection. Whoever wants something of a device
+//! asks the link, so two users of one wire cannot collide. The wire connects at once and again after a drop, sends one
+//! request at a time, and takes nothing for an answer that does not answer that request.
 //!
 //! - **Reads are retried, writes never.** A write leaves at most once. If its answer is lost, the caller learns just
 //!   that ([`LinkError::Lost`]) and finds out by reading.
@@ -10,7 +10,8 @@
 //!   being connected they wait as long as they would wait for an answer.
 //! - **Commands go first**, then what a person waits for, then polling ([`Priority`]).
 //!
-//! Inside, `wire` holds every rule as a pure state machine, `task` the socket and the clock.
+//! Inside, `wire` holds every rule as a pure state machine that is given the time; `shared` puts it and the connection
+//! behind one lock; `task` connects and keeps time.
 
 mod endpoint;
 mod error;

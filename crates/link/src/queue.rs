@@ -59,6 +59,10 @@ impl Queue {
                 index
             }
             None => {
+                if self.slots.is_empty() {
+                    // Most wires never have more than one job at a time.
+                    self.slots.reserve_exact(1);
+                }
                 self.slots.push(Slot { next: None, stage: Stage::Pending, entry, result: Ok(()) });
                 self.slots.len() - 1
             }

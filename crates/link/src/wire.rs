@@ -1,7 +1,7 @@
 //! The rules of one wire as a pure state machine: time, bytes and events in; the next step out.
 //!
-//! It has no clock and no socket, so every rule is tested as a script. The task in `task.rs` does
-//! what it says and tells it what happened.
+//! It has no clock and no socket, so every rule is tested as a script. `shared` does what it says and tells it what
+//! happened.
 
 use std::sync::Arc;
 use std::task::{Poll, Waker};
@@ -15,6 +15,9 @@ use crate::job::{Job, Outcome, Priority};
 use crate::options::{Backoff, Options};
 use crate::queue::{Entry, Place, Queue, Ticket};
 use crate::statistics::Statistics;
+
+/// Longer waits are cut to this, so that no sum of times overflows.
+const LONGEST_WAIT: Duration = Duration::from_secs(24 * 60 * 60);
 
 /// One wire: what waits, what is under way, and what state the connection is in.
 #[derive(Debug)]
@@ -46,7 +49,7 @@ impl Wire {
         Self {
             endpoint,
             rules: Rules {
-                spacing: options.spacing,
+                spacing: options.spacing.min(LONGEST_WAIT),
                 retries: options.retries,
                 timeouts_to_drop: options.timeouts_to_drop,
                 backoff: options.backoff,
@@ -74,6 +77,7 @@ impl Wire {
         if let Err(error) = self.accepts(job.priority) {
             return Err(Outcome { result: Err(error), registers: job.registers });
         }
+        let job = Job { timeout: job.timeout.min(LONGEST_WAIT), ..job };
         Ok(self.queue.push(Entry { job, since: now, tries: 0, waker: Some(waker.clone()) }))
     }
 
@@ -311,9 +315,11 @@ impl Wire {
     }
 
     fn answered(&mut self, now: Duration, wakes: &mut Vec<Waker>) {
-        let (Some(exchange), Some(response)) = (self.exchange.take(), self.client.response()) else {
-            return;
+        let Some(response) = self.client.response() else {
+            // It said that there is one.
+            return self.hang_up(now, Cause::Garbage, wakes);
         };
+        let Some(exchange) = self.exchange.take() else { return };
         self.failures = 0;
         self.silent = 0;
         self.earliest = now + self.rules.spacing;
@@ -405,7 +411,7 @@ impl Wire {
             wakes,
         );
         self.enter(Phase::Down {
-            retry_at: now + self.rules.backoff.delay(self.failures),
+            retry_at: now + self.rules.backoff.delay(self.failures).min(LONGEST_WAIT),
             trying: false,
             reason,
         });
@@ -504,5 +510,9 @@ struct Rules {
     backoff: Backoff,
 }
 
+#[cfg(test)]
+mod promises;
+#[cfg(test)]
+mod script;
 #[cfg(test)]
 mod tests;

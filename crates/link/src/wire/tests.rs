@@ -1,146 +1,10 @@
 //! Scripts of one wire: what happens at which millisecond, and what must follow.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::task::Wake;
-
 use busbar_modbus::ExceptionCode;
-use proptest::prelude::*;
 
+use super::script::*;
 use super::*;
-use crate::job::{Ask, Write};
-
-const TIMEOUT: u64 = 1000;
-const ADDRESS: u16 = 10246;
-
-fn ms(millis: u64) -> Duration {
-    Duration::from_millis(millis)
-}
-
-struct Script {
-    wire: Wire,
-    out: Vec<u8>,
-    wakes: Vec<Waker>,
-    woken: Arc<Woken>,
-}
-
-impl Script {
-    fn new() -> Self {
-        Self::with(Options::default())
-    }
-
-    fn with(options: Options) -> Self {
-        Self {
-            wire: Wire::new(endpoint(), Framing::Tcp, &options),
-            out: Vec::new(),
-            wakes: Vec::new(),
-            woken: Arc::default(),
-        }
-    }
-
-    fn connected() -> Self {
-        let mut script = Self::new();
-        script.connect(0);
-        script
-    }
-
-    fn connect(&mut self, at: u64) {
-        assert_eq!(self.step(at), Step::Connect);
-        self.wire.connected(ms(at));
-    }
-
-    fn step(&mut self, at: u64) -> Step {
-        self.wire.step(ms(at), &mut self.out, &mut self.wakes)
-    }
-
-    /// Steps, and expects a frame to leave.
-    fn sends(&mut self, at: u64) -> Vec<u8> {
-        assert_eq!(self.step(at), Step::Send(Some(ms(at + TIMEOUT))));
-        self.out.clone()
-    }
-
-    fn submit(&mut self, at: u64, priority: Priority, ask: Ask) -> Result<Ticket, LinkError> {
-        let job = Job { unit: 1, ask, priority, timeout: ms(TIMEOUT), registers: Vec::new() };
-        let waker = Waker::from(Arc::clone(&self.woken));
-        let submitted = self.wire.submit(ms(at), job, &waker);
-        submitted.map_err(|outcome| outcome.result.unwrap_err())
-    }
-
-    fn read(&mut self, at: u64) -> Ticket {
-        self.submit(at, Priority::Person, read(ADDRESS)).unwrap()
-    }
-
-    fn write(&mut self, at: u64, value: u16) -> Ticket {
-        self.submit(at, Priority::Command, write(value)).unwrap()
-    }
-
-    fn hears(&mut self, at: u64, bytes: &[u8]) {
-        self.wire.received(ms(at), bytes, &mut self.wakes);
-    }
-
-    fn loses(&mut self, at: u64, cause: Cause) {
-        self.wire.lost(ms(at), cause, &mut self.wakes);
-    }
-
-    fn refuses(&mut self, at: u64, cause: Cause) {
-        self.wire.refused(ms(at), cause, &mut self.wakes);
-    }
-
-    fn outcome(&mut self, ticket: &Ticket) -> Option<Result<Vec<u16>, LinkError>> {
-        match self.wire.take(ticket, &Waker::from(Arc::clone(&self.woken))) {
-            Poll::Ready(outcome) => Some(outcome.result.map(|()| outcome.registers)),
-            Poll::Pending => None,
-        }
-    }
-
-    fn statistics(&self) -> Statistics {
-        self.wire.statistics()
-    }
-}
-
-fn endpoint() -> Arc<Endpoint> {
-    Arc::new("tcp://10.0.0.7".parse().unwrap())
-}
-
-fn down(cause: Cause) -> LinkError {
-    LinkError::Down { reason: Outage { endpoint: endpoint(), cause } }
-}
-
-fn lost(cause: Cause) -> LinkError {
-    LinkError::Lost { unit: 1, loss: Loss::Dropped(Outage { endpoint: endpoint(), cause }) }
-}
-
-fn read(address: u16) -> Ask {
-    Ask::Holding { address, count: 2 }
-}
-
-fn write(value: u16) -> Ask {
-    Ask::Write(Write::Register { address: 8193, value })
-}
-
-fn frame(transaction: u16, pdu: &[u8]) -> Vec<u8> {
-    let [high, low] = transaction.to_be_bytes();
-    let length = u8::try_from(pdu.len() + 1).unwrap();
-    [&[high, low, 0, 0, 0, length, 1], pdu].concat()
-}
-
-/// The answer to `read`.
-fn answer(transaction: u16) -> Vec<u8> {
-    frame(transaction, &[0x03, 4, 0x08, 0xFE, 0, 0])
-}
-
-/// The answer to `write(4)`.
-fn echo(transaction: u16) -> Vec<u8> {
-    frame(transaction, &[0x06, 0x20, 0x01, 0, 4])
-}
-
-#[derive(Default)]
-struct Woken(AtomicUsize);
-
-impl Wake for Woken {
-    fn wake(self: Arc<Self>) {
-        self.0.fetch_add(1, Ordering::Relaxed);
-    }
-}
+use crate::job::Ask;
 
 #[test]
 fn asks_and_is_answered() {
@@ -341,7 +205,7 @@ fn fails_everything_that_waits_when_it_goes_down() {
     assert_eq!(script.outcome(&write), Some(Err(down(Cause::Refused))));
     assert_eq!(script.statistics().requests, 1, "the write was not sent");
 
-    let refused = script.submit(7, Priority::Command, super::tests::write(4));
+    let refused = script.submit(7, Priority::Command, super::script::write(4));
     assert_eq!(refused, Err(down(Cause::Refused)));
 }
 
@@ -540,6 +404,35 @@ fn refuses_what_has_no_frame() {
 }
 
 #[test]
+fn takes_for_ever_as_a_day() {
+    let day = Duration::from_secs(86_400);
+    let mut script = Script::with(Options {
+        spacing: Duration::MAX,
+        backoff: Backoff { first: Duration::MAX, max: Duration::MAX },
+        ..Options::default()
+    });
+    let endless = Job {
+        unit: 1,
+        ask: read(1),
+        priority: Priority::Poll,
+        timeout: Duration::MAX,
+        registers: Vec::new(),
+    };
+    script.wire.submit(ms(0), endless, Waker::noop()).unwrap();
+    assert_eq!(script.step(0), Step::Connect);
+    assert_eq!(script.step(0), Step::Wait(Some(day)));
+    script.wire.connected(ms(0));
+    assert_eq!(script.step(0), Step::Send(Some(day)));
+    script.hears(0, &answer(1));
+    script.read(0);
+    assert_eq!(script.step(0), Step::Wait(Some(day)));
+    script.loses(0, Cause::Closed);
+    assert_eq!(script.step(0), Step::Connect);
+    script.refuses(0, Cause::Refused);
+    assert_eq!(script.step(0), Step::Wait(Some(day)));
+}
+
+#[test]
 fn ends_everything_when_closed() {
     let mut script = Script::connected();
     let flying = script.read(0);
@@ -565,168 +458,4 @@ fn reports_each_change_of_the_connection_once() {
     script.step(1);
     script.refuses(2, Cause::Refused);
     assert!(matches!(script.wire.news(), Some(Phase::Down { .. })));
-}
-
-/// What may happen next in the play with chance.
-#[derive(Clone, Debug)]
-enum Turn {
-    Read(u16),
-    Write,
-    Cancel(usize),
-    Answer,
-    Late(u16),
-    Refuse(u8),
-    Noise(Vec<u8>),
-    Drop,
-    Connect,
-    FailConnect,
-    Pass(u64),
-}
-
-fn turn() -> impl Strategy<Value = Turn> {
-    prop_oneof![
-        4 => (0_u16..50).prop_map(Turn::Read),
-        3 => Just(Turn::Write),
-        1 => (0_usize..8).prop_map(Turn::Cancel),
-        6 => Just(Turn::Answer),
-        2 => (1_u16..4).prop_map(Turn::Late),
-        1 => (1_u8..12).prop_map(Turn::Refuse),
-        1 => proptest::collection::vec(any::<u8>(), 1..20).prop_map(Turn::Noise),
-        1 => Just(Turn::Drop),
-        4 => Just(Turn::Connect),
-        1 => Just(Turn::FailConnect),
-        3 => (1_u64..1500).prop_map(Turn::Pass),
-    ]
-}
-
-/// A caller and what it asked: the address of a read or the value of a write.
-struct Caller {
-    ticket: Option<Ticket>,
-    asked: Result<u16, u16>,
-}
-
-/// What a device that holds `address + transaction` in each register answers; echoes writes.
-fn device(transaction: u16, sent: &[u8]) -> Vec<u8> {
-    let address = u16::from_be_bytes([sent[8], sent[9]]);
-    match sent[7] {
-        0x03 => {
-            let [high, low] = address.to_be_bytes();
-            let [h, l] = transaction.to_be_bytes();
-            frame(transaction, &[0x03, 4, high, low, h, l])
-        }
-        _ => frame(transaction, &sent[7..12]),
-    }
-}
-
-proptest! {
-    /// Whatever happens: a caller has its own answer, in answer to its own last request, or an error; no write leaves
-    /// twice; a write that failed with anything but `Lost` or an exception never left.
-    #[test]
-    fn keeps_its_promises(turns in proptest::collection::vec(turn(), 1..120)) {
-        let mut script = Script::new();
-        let mut callers: Vec<Caller> = Vec::new();
-        let mut written: Vec<u16> = Vec::new();
-        // Frames that left, and the connection's end.
-        let mut sent: Vec<Vec<u8>> = Vec::new();
-        let mut now = 0;
-        let mut connecting = false;
-        let mut up = false;
-        let mut next_value = 0;
-
-        // In the end the device is switched off: nobody may wait for ever.
-        let switched_off = [Turn::Pass(10_000), Turn::FailConnect].into_iter().cycle().take(400);
-        for turn in turns.into_iter().chain(switched_off) {
-            let last = u16::try_from(sent.len()).unwrap();
-            match turn {
-                Turn::Read(address) => {
-                    let ticket = script.submit(now, Priority::Poll, read(address)).ok();
-                    callers.push(Caller { ticket, asked: Ok(address) });
-                }
-                Turn::Write => {
-                    let ticket = script.submit(now, Priority::Command, write(next_value)).ok();
-                    callers.push(Caller { ticket, asked: Err(next_value) });
-                    next_value += 1;
-                }
-                Turn::Cancel(index) => {
-                    if let Some(ticket) = callers.get_mut(index).and_then(|caller| caller.ticket.take()) {
-                        script.wire.cancel(ticket);
-                    }
-                }
-                Turn::Answer if up && last > 0 => {
-                    let bytes = device(last, &sent[sent.len() - 1]);
-                    script.hears(now, &bytes);
-                }
-                Turn::Late(by) if up && last > by => {
-                    let bytes = device(last - by, &sent[usize::from(last - by) - 1]);
-                    script.hears(now, &bytes);
-                }
-                Turn::Refuse(code) if up && last > 0 => {
-                    let function = sent[sent.len() - 1][7] | 0x80;
-                    script.hears(now, &frame(last, &[function, code]));
-                }
-                Turn::Noise(bytes) if up => script.hears(now, &bytes),
-                Turn::Drop if up => {
-                    up = false;
-                    script.loses(now, Cause::Reset);
-                }
-                Turn::Connect if connecting => {
-                    connecting = false;
-                    up = true;
-                    script.wire.connected(ms(now));
-                }
-                Turn::FailConnect if connecting => {
-                    connecting = false;
-                    script.refuses(now, Cause::Refused);
-                }
-                Turn::Pass(millis) => now += millis,
-                _ => {}
-            }
-            loop {
-                match script.step(now) {
-                    Step::Send(_) => {
-                        prop_assert!(up);
-                        if script.out[7] == 0x06 {
-                            let value = u16::from_be_bytes([script.out[10], script.out[11]]);
-                            prop_assert!(!written.contains(&value), "write {} left twice", value);
-                            written.push(value);
-                        }
-                        sent.push(script.out.clone());
-                        prop_assert_eq!(script.out[..2].to_vec(), u16::try_from(sent.len()).unwrap().to_be_bytes());
-                        break;
-                    }
-                    Step::Connect => connecting = true,
-                    Step::Disconnect => up = false,
-                    Step::Wait(until) => {
-                        prop_assert!(until.is_none_or(|until| until > ms(now)), "a wait that is over");
-                        break;
-                    }
-                    Step::End => prop_assert!(false, "ended by itself"),
-                }
-            }
-            for caller in &mut callers {
-                let Some(ticket) = &caller.ticket else { continue };
-                let Some(outcome) = script.outcome(ticket) else { continue };
-                caller.ticket = None;
-                match (caller.asked, outcome) {
-                    (Ok(address), Ok(registers)) => {
-                        let last = u16::try_from(sent.len()).unwrap();
-                        // Noise may forge an answer only by guessing the transaction: it does not in these runs.
-                        prop_assert_eq!(registers[0], address);
-                        prop_assert!(registers[1] == last || registers[1] + 1 == last);
-                    }
-                    (Ok(_), Err(error)) => {
-                        let never = matches!(error, LinkError::Lost { .. });
-                        prop_assert!(!never, "a read is never lost");
-                    }
-                    (Err(value), Ok(_) | Err(LinkError::Lost { .. } | LinkError::Exception { .. })) => {
-                        prop_assert!(written.contains(&value));
-                    }
-                    (Err(value), Err(error)) => {
-                        prop_assert!(!written.contains(&value), "{} but it left", error);
-                    }
-                }
-            }
-        }
-        prop_assert!(callers.iter().all(|caller| caller.ticket.is_none()), "somebody still waits");
-    }
 }
