@@ -148,6 +148,13 @@ impl Bank {
         BitSet::from_registers(registers.unwrap_or_default())
     }
 
+    /// The number that stands at an address now, pinned or not.
+    pub(crate) fn number_shown(&self, address: u16) -> Option<f64> {
+        let point = self.point(address)?;
+        let registers = self.read(address, point.registers)?;
+        Some(point.decode(registers, self.profile.wire.word_order).value?.as_number()?.as_f64())
+    }
+
     fn store(&mut self, address: u16, value: &Value) {
         let Some((index, point)) = self.indexed(address) else { return self.refuse() };
         if self.pinned[index] {

@@ -135,13 +135,11 @@ fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartErro
         return Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() });
     }
     let wanted = config.model.as_deref().unwrap_or("D-500");
-    let unknown = || StartError::UnknownModel { model: wanted.to_owned(), allowed: profile.models.clone() };
-    let model = profile.models.iter().find(|model| model.eq_ignore_ascii_case(wanted)).ok_or_else(unknown)?;
-    let code = profile
-        .identity
-        .as_ref()
-        .and_then(|identity| identity.models.iter().find(|known| known.model == *model))
-        .ok_or_else(unknown)?
-        .value;
-    Ok(Box::new(DatakomD::new(model, code, config.seed, config.story)))
+    // Every unit that its identity tells apart, with those the manual's title does not name.
+    let known = profile.identity.as_ref().map_or(&[][..], |identity| &identity.models);
+    let Some(known) = known.iter().find(|known| known.model.eq_ignore_ascii_case(wanted)) else {
+        let allowed = known.iter().map(|known| known.model.clone()).collect();
+        return Err(StartError::UnknownModel { model: wanted.to_owned(), allowed });
+    };
+    Ok(Box::new(DatakomD::new(&known.model, known.value, config.seed, config.story)))
 }

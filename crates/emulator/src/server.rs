@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use busbar_link::Endpoint;
-use busbar_modbus::{Framing, Losses, Server};
+use busbar_modbus::pdu::EXCEPTION_BIT;
+use busbar_modbus::stream::Frame;
+use busbar_modbus::{ExceptionCode, Framing, Losses, Request, Response, ServerDecoder, mbap};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream, lookup_host};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
@@ -123,30 +125,51 @@ impl Shared {
     }
 
     /// Answers everything that has come in; true when the device restarts because of it.
-    fn exchange(&self, server: &mut Server, before: &mut Losses, out: &mut Vec<u8>) -> bool {
+    fn exchange(&self, decoder: &mut ServerDecoder, before: &mut Losses, out: &mut Vec<u8>) -> bool {
         let mut inner = self.lock();
         let Inner { device, statistics } = &mut *inner;
         device.count_packet();
-        while let Some(incoming) = server.next_request() {
-            statistics.requests += 1;
-            if incoming.malformed.is_some() {
-                statistics.garbage += 1;
-                continue;
+        while let Some(Ok(frame)) = decoder.next_frame() {
+            match request(frame.pdu) {
+                Some(request) => {
+                    statistics.requests += 1;
+                    statistics.answers += u64::from(answer(device, &frame, &request, out));
+                }
+                None => statistics.garbage += 1,
             }
-            let answered = device
-                .answer(incoming.unit, &incoming.request)
-                .is_some_and(|response| incoming.respond(&response, out).is_ok());
-            statistics.answers += u64::from(answered);
         }
-        let losses = *server.losses();
+        let losses = *decoder.losses();
         statistics.garbage += dropped(&losses) - dropped(before);
         *before = losses;
         device.is_silent()
     }
 }
 
+/// What a client asks; function 0 is none, and gets the answer of any other that a device does not have.
+fn request(pdu: &[u8]) -> Option<Request<'_>> {
+    match pdu {
+        [0, data @ ..] => Some(Request::Other { function: 0, data }),
+        _ => Request::decode(pdu).ok(),
+    }
+}
+
+/// Appends the answer to one frame; false where there is none.
+fn answer(device: &mut Device, frame: &Frame<'_>, request: &Request<'_>, out: &mut Vec<u8>) -> bool {
+    let (transaction, unit) = (frame.transaction, frame.unit);
+    match device.answer(unit, request) {
+        // No encoder writes function 0: it is no function.
+        Some(Response::Exception { function: 0, code: ExceptionCode(code) }) => {
+            let [high, low] = transaction.to_be_bytes();
+            out.extend_from_slice(&[high, low, 0, 0, 0, 3, unit, EXCEPTION_BIT, code]);
+            true
+        }
+        Some(response) => mbap::encode_response(transaction, unit, &response, out).is_ok(),
+        None => false,
+    }
+}
+
 fn dropped(losses: &Losses) -> u64 {
-    losses.garbage_bytes + losses.crc_errors + losses.wrong_protocol + losses.malformed
+    losses.garbage_bytes + losses.crc_errors + losses.wrong_protocol
 }
 
 async fn bind(endpoint: &Endpoint) -> Result<(Endpoint, TcpListener), StartError> {
@@ -216,8 +239,8 @@ fn admit(stream: TcpStream, shared: &Arc<Shared>, connections: &mut JoinSet<()>)
 /// One connection: one read and one write for each exchange.
 async fn serve(mut stream: TcpStream, shared: Arc<Shared>, _place: OwnedSemaphorePermit) {
     let _ = stream.set_nodelay(true);
-    let mut server = Server::new(Framing::Tcp);
-    let mut losses = *server.losses();
+    let mut decoder = ServerDecoder::new(Framing::Tcp);
+    let mut losses = *decoder.losses();
     let mut buffer = [0; READ_BYTES];
     let mut out = Vec::with_capacity(512);
     // Checked once an idle period instead of being set anew with every request.
@@ -240,15 +263,15 @@ async fn serve(mut stream: TcpStream, shared: Arc<Shared>, _place: OwnedSemaphor
             }
         };
         heard = true;
-        server.receive(Duration::ZERO, &buffer[..count]);
+        decoder.push(&buffer[..count]);
         out.clear();
-        let restarting = shared.exchange(&mut server, &mut losses, &mut out);
+        let restarting = shared.exchange(&mut decoder, &mut losses, &mut out);
         let sent =
             out.is_empty() || matches!(timeout(WRITE_PATIENCE, stream.write_all(&out)).await, Ok(Ok(())));
         if restarting {
             shared.restarts.send_replace(());
         }
-        if restarting || !sent || server.fault().is_some() {
+        if restarting || !sent || decoder.fault().is_some() {
             return;
         }
     }

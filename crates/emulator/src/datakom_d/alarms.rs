@@ -11,6 +11,8 @@ const LOW_FUEL_LEVEL: u16 = 58;
 const LOW_BATTERY_VOLTAGE: u16 = 96;
 const FAIL_TO_START: u16 = 98;
 const LOW_CHARGE_VOLTAGE: u16 = 100;
+/// Those of services 2 and 3 follow.
+pub(super) const SERVICE_1_REQUEST: u16 = 118;
 
 /// How long the horn sounds for a new alarm.
 const HORN: Duration = Duration::from_secs(30);

@@ -4,9 +4,12 @@
 //! the imitation does:
 //! - one word may press several keys: STOP wins, the others act in the order of their bits; the press length (bits
 //!   14 and 15) and the menu keys change nothing yet;
-//! - TEST runs the genset on load; RUN (MANUAL with RUN on a D-700) runs it off load, and the breaker keys then move
-//!   the load;
+//! - TEST runs the genset on load; RUN (MANUAL with RUN on a D-700) runs it off load;
+//! - the rows of bits 1 and 4 and of mode 2 leave the D-300 out: its front has neither MANUAL nor RUN;
+//! - a breaker key works in mode 2 and moves its own breaker: a closed one opens, for an open one the other opens
+//!   first. The genset's is dead until the engine is up to speed;
 //! - STOP cools a running engine down first; STOP again stops it at once;
+//! - a service is due when its hours or its days are used up, and then a warning without a horn;
 //! - a channel above 19 is acknowledged and ignored;
 //! - the hard reset drops every output but the mains breaker and keeps mode and counters.
 
@@ -27,7 +30,7 @@ use crate::waveform::Distortion;
 use busbar_modbus::ExceptionCode;
 
 use alarms::Alarms;
-use sequence::{Demand, Sensed, Sequence};
+use sequence::{Demand, Sensed, Sequence, Source};
 use story::Scene;
 
 const PUSH_BUTTONS: u16 = 8193;
@@ -50,9 +53,8 @@ pub(crate) struct DatakomD {
     mode: Mode,
     /// RUN was pressed: the engine is wanted in the manual mode.
     run_wanted: bool,
-    /// The load was moved to the genset by its breaker key.
-    load_wanted: bool,
-    mains_held_open: bool,
+    /// What the breaker keys chose in the manual mode.
+    source: Source,
     controls: Controls,
     block_heater: bool,
     fuel_pump: bool,
@@ -85,6 +87,18 @@ enum Front {
     Run,
     /// MANUAL selects the mode and RUN starts, as on a D-700.
     ManualAndRun,
+    /// None that the manual gives to this model, as on a D-300.
+    Neither,
+}
+
+impl Front {
+    fn of(model: &str) -> Self {
+        match model {
+            "D-300" => Self::Neither,
+            "D-700" => Self::ManualAndRun,
+            _ => Self::Run,
+        }
+    }
 }
 
 /// What makes this unit this unit.
@@ -116,8 +130,7 @@ impl DatakomD {
             identity: Identity::new(model, code, &mut random),
             mode: Mode::Auto,
             run_wanted: false,
-            load_wanted: false,
-            mains_held_open: false,
+            source: Source::Mains,
             controls: Controls { mains_breaker: true, ..Controls::default() },
             block_heater: false,
             fuel_pump: false,
@@ -136,19 +149,12 @@ impl DatakomD {
         unit
     }
 
-    fn sensed(&self) -> Sensed {
-        Sensed::from(&self.plant)
-    }
-
     fn demand(&self) -> Demand {
         match self.mode {
-            Mode::Stop => Demand::Rest,
-            Mode::Run if !self.run_wanted => Demand::Rest,
-            Mode::Run if self.load_wanted => Demand::OnLoad,
-            Mode::Run => Demand::OffLoad,
-            Mode::Auto if self.scene.exerciser => Demand::OnLoad,
-            Mode::Auto => Demand::Rest,
-            Mode::Test => Demand::OnLoad,
+            Mode::Run => Demand { engine: self.run_wanted, source: self.source },
+            Mode::Test => Demand::ON_LOAD,
+            Mode::Auto if self.scene.exerciser => Demand::ON_LOAD,
+            Mode::Auto | Mode::Stop => Demand::REST,
         }
     }
 
@@ -171,8 +177,11 @@ impl DatakomD {
                 }
                 (2, _) => self.enter(Mode::Auto),
                 (3, _) => self.enter(Mode::Test),
-                (5, _) if self.mode == Mode::Run => self.load_wanted = !self.load_wanted,
-                (6, _) if self.mode == Mode::Run => self.press_mains_breaker(),
+                (5, _) => {
+                    let ready = self.sequence.is_up_to_speed() && self.plant.genset_healthy();
+                    self.press_breaker(Source::Genset, ready);
+                }
+                (6, _) => self.press_breaker(Source::Mains, self.plant.mains_healthy()),
                 _ => {}
             }
         }
@@ -186,10 +195,14 @@ impl DatakomD {
         self.sequence.acknowledge();
     }
 
-    fn press_mains_breaker(&mut self) {
-        match self.load_wanted {
-            true => self.load_wanted = false,
-            false => self.mains_held_open = !self.mains_held_open,
+    fn press_breaker(&mut self, own: Source, ready: bool) {
+        if self.mode != Mode::Run {
+            return;
+        }
+        if self.source == own {
+            self.source = Source::Nothing;
+        } else if ready {
+            self.source = own;
         }
     }
 
@@ -197,8 +210,7 @@ impl DatakomD {
         if mode != self.mode {
             self.mode = mode;
             self.run_wanted = false;
-            self.load_wanted = false;
-            self.mains_held_open = false;
+            self.source = Source::Mains;
         }
     }
 
@@ -208,8 +220,7 @@ impl DatakomD {
         self.alarms = Alarms::default();
         self.channel = 0;
         self.run_wanted = false;
-        self.load_wanted = false;
-        self.mains_held_open = false;
+        self.source = Source::Mains;
         self.ethernet_resets = self.ethernet_resets.wrapping_add(1);
     }
 
@@ -236,14 +247,16 @@ impl Panel for DatakomD {
             self.plant.step(seconds, &self.controls);
             return;
         }
-        self.sequence.step(dt, self.demand(), self.sensed());
+        // The plant first: the status then tells of breakers that have moved, in the same image.
+        self.plant.step(seconds, &self.controls);
+        let (demand, sensed) = (self.demand(), Sensed::from(&self.plant));
+        self.sequence.step(dt, demand, sensed);
         self.keep_ready();
         self.controls = Controls {
             block_heater: self.block_heater,
             fuel_pump: self.fuel_pump,
-            ..self.sequence.controls(self.mains_held_open, self.sensed())
+            ..self.sequence.controls(demand, sensed)
         };
-        self.plant.step(seconds, &self.controls);
         self.alarms.step(dt, &self.plant, self.sequence.failed_to_start());
     }
 
@@ -292,7 +305,7 @@ impl Identity {
         Self {
             code,
             model: model.to_owned(),
-            front: if model == "D-700" { Front::ManualAndRun } else { Front::Run },
+            front: Front::of(model),
             mac,
             unique,
             imei: imei(random.bits()),

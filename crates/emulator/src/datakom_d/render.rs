@@ -7,6 +7,7 @@ use crate::lcd::Canvas;
 use crate::plant::{Feed, RATED_KVA, RATED_KW};
 use crate::waveform::{Analysis, Shape};
 
+use super::alarms::SERVICE_1_REQUEST;
 use super::sequence::Operation;
 use super::{DatakomD, Mode};
 
@@ -16,6 +17,9 @@ const WARNING_ALARMS: u16 = 10536;
 const OPERATION_STATUS: u16 = 10604;
 const UNIT_MODE: u16 = 10605;
 const ETHERNET_PACKETS: u16 = 11683;
+/// Registers of the hours and days left of each service, with the hours and days between two.
+const SERVICES: [([u16; 2], [f64; 2]); 3] =
+    [([10634, 10636], [250.0, 180.0]), ([10638, 10640], [500.0, 365.0]), ([10642, 10644], [1000.0, 730.0])];
 
 /// Above this the oil pressure is there, bar.
 const OIL_PRESSURE_OK: f64 = 1.2;
@@ -33,9 +37,10 @@ pub(super) fn registers(unit: &DatakomD, bank: &mut Bank) {
     identity(unit, bank);
     load_share(unit, bank);
     packets(unit, bank);
-    alarms(unit, bank);
-    // These follow what the alarm arrays show, pinned or not.
-    let shown = Shown::of(bank);
+    // These follow what the counters and then the alarm arrays show, pinned or not.
+    let due = services_due(bank);
+    alarms(unit, due, bank);
+    let shown = Shown::of(due, bank);
     flags(unit, &shown, bank);
     leds(unit, &shown, bank);
     inputs_and_outputs(unit, bank);
@@ -234,12 +239,9 @@ fn counters(unit: &DatakomD, bank: &mut Bank) {
     bank.number(10626, days);
     let energy = &plant.genset_energy;
     bank.numbers(10628, 2, [energy.active, energy.inductive, energy.capacitive]);
-    // Hours and days that are left of three service intervals.
-    for (address, hours, interval_days) in
-        [(10634, 250.0, 180.0), (10638, 500.0, 365.0), (10642, 1000.0, 730.0)]
-    {
-        bank.number(address, hours - since_service);
-        bank.number(address + 2, interval_days - days);
+    for ([hours_left, days_left], [interval_hours, interval_days]) in SERVICES {
+        bank.number(hours_left, interval_hours - since_service);
+        bank.number(days_left, interval_days - days);
     }
 
     let energy = &plant.mains_energy;
@@ -275,14 +277,24 @@ fn load_share(unit: &DatakomD, bank: &mut Bank) {
     bank.number(11378, 0.0);
 }
 
-fn alarms(unit: &DatakomD, bank: &mut Bank) {
-    bank.bits(SHUTDOWN_ALARMS, unit.alarms.shutdown);
-    bank.bits(LOAD_DUMP_ALARMS, unit.alarms.load_dump);
-    bank.bits(WARNING_ALARMS, unit.alarms.warning);
+fn services_due(bank: &Bank) -> [bool; SERVICES.len()] {
+    let used_up = |register| bank.number_shown(register).is_some_and(|left| left <= 0.0);
+    SERVICES.map(|(left, _)| left.into_iter().any(used_up))
 }
 
-/// Which alarm arrays have a bit set.
+fn alarms(unit: &DatakomD, due: [bool; SERVICES.len()], bank: &mut Bank) {
+    let mut warning = unit.alarms.warning;
+    for (bit, due) in (SERVICE_1_REQUEST..).zip(due) {
+        warning.set(bit, due);
+    }
+    bank.bits(SHUTDOWN_ALARMS, unit.alarms.shutdown);
+    bank.bits(LOAD_DUMP_ALARMS, unit.alarms.load_dump);
+    bank.bits(WARNING_ALARMS, warning);
+}
+
+/// Which alarm arrays have a bit set, and which services are due.
 struct Shown {
+    due: [bool; SERVICES.len()],
     shutdown: bool,
     load_dump: bool,
     warning: bool,
@@ -290,10 +302,11 @@ struct Shown {
 }
 
 impl Shown {
-    fn of(bank: &Bank) -> Self {
+    fn of(due: [bool; SERVICES.len()], bank: &Bank) -> Self {
         let [shutdown, load_dump, warning] =
             [SHUTDOWN_ALARMS, LOAD_DUMP_ALARMS, WARNING_ALARMS].map(|array| bank.bits_shown(array).len());
         Self {
+            due,
             shutdown: shutdown > 0,
             load_dump: load_dump > 0,
             warning: warning > 0,
@@ -304,16 +317,17 @@ impl Shown {
 
 /// The function flags, by the manual's numbers; those not named here stay 0.
 fn flags(unit: &DatakomD, shown: &Shown, bank: &mut Bank) {
+    let set = output_flags(unit).into_iter().chain(state_flags(unit, shown));
+    bank.bits(11555, set.filter(|(_, on)| *on).map(|(flag, _)| flag).collect::<BitSet>());
+}
+
+fn output_flags(unit: &DatakomD) -> impl IntoIterator<Item = (u16, bool)> {
     use Operation::*;
     let (plant, controls) = (&unit.plant, &unit.controls);
     let operation = unit.sequence.operation();
     let running = plant.engine.is_running();
     let hot = plant.engine.coolant > 85.0;
-    let genset_healthy = plant.genset_healthy();
-    let tripped = shown.shutdown || shown.load_dump;
-    // Protections are live once the engine has been brought to speed.
-    let protected = running && (OffLoad as u8..=CoolingDown as u8).contains(&(operation as u8));
-    let set = [
+    [
         (0, controls.fuel),
         (1, unit.alarms.horn()),
         (2, controls.starter),
@@ -324,10 +338,10 @@ fn flags(unit: &DatakomD, shown: &Shown, bank: &mut Bank) {
         (7, operation == Preheat),
         (9, controls.starter),
         (10, operation == GensetBreakerActivation),
-        (11, operation == TransferToMains),
+        (11, plant.genset_breaker.closed && !controls.genset_breaker),
         (12, controls.genset_breaker),
         (13, operation == MainsBreakerActivation),
-        (14, operation == TransferToGenset),
+        (14, plant.mains_breaker.closed && !controls.mains_breaker),
         (15, controls.mains_breaker),
         (18, controls.fuel_pump),
         (20, controls.block_heater),
@@ -336,14 +350,28 @@ fn flags(unit: &DatakomD, shown: &Shown, bank: &mut Bank) {
         (23, running && hot),
         (24, running),
         (25, running),
+    ]
+}
+
+fn state_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16, bool)> {
+    use Operation::*;
+    let plant = &unit.plant;
+    let operation = unit.sequence.operation();
+    let running = plant.engine.is_running();
+    let genset_healthy = plant.genset_healthy();
+    let tripped = shown.shutdown || shown.load_dump;
+    [
         (28, running && genset_healthy && !tripped),
+        (36, shown.due[0]),
+        (37, shown.due[1]),
+        (38, shown.due[2]),
         (41, unit.mode == Mode::Auto && !tripped),
         (42, unit.scene.exerciser),
         (43, unit.scene.exerciser && unit.mode == Mode::Auto),
         (44, !plant.mains_healthy()),
         (46, running),
         (47, genset_healthy),
-        (48, protected),
+        (48, running && unit.sequence.is_up_to_speed()),
         (49, plant.engine.oil_pressure > OIL_PRESSURE_OK),
         (50, shown.shutdown),
         (51, shown.load_dump),
@@ -364,8 +392,7 @@ fn flags(unit: &DatakomD, shown: &Shown, bank: &mut Bank) {
         (67, matches!(operation, IdleBeforeStop | ImmediateStop | Stopping)),
         (78, operation == OnLoad),
         (108, plant.mains_healthy()),
-    ];
-    bank.bits(11555, set.into_iter().filter(|(_, on)| *on).map(|(flag, _)| flag).collect::<BitSet>());
+    ]
 }
 
 /// Two bits a LED. The manual does not say which is which: alarms, then modes, then sources and breakers.
@@ -420,13 +447,15 @@ fn inputs_and_outputs(unit: &DatakomD, bank: &mut Bank) {
 fn lcd(unit: &DatakomD, shown: &Shown, bank: &mut Bank) {
     let plant = &unit.plant;
     let mut canvas = Canvas::new();
-    canvas.text(0, 0, &unit.identity.model);
-    canvas.text_right(0, unit.mode_name());
+    let model = unit.identity.model.as_str();
+    let label = |point, code: u8| {
+        let choice = bank.profile().point(point).and_then(|point| point.choice(code.into()));
+        choice.map_or("", |choice| choice.label_for(Some(model)))
+    };
+    canvas.text(0, 0, model);
+    canvas.text_right(0, label("unit_mode", unit.mode as u8));
     canvas.invert(0);
-
-    let status = u32::from(unit.sequence.operation() as u8);
-    let label = bank.profile().point("operation_status").and_then(|point| point.choice(status));
-    canvas.text(1, 0, label.map_or("", |choice| choice.label.as_str()));
+    canvas.text(1, 0, label("operation_status", unit.sequence.operation() as u8));
     if unit.sequence.seconds_left() > 0 {
         canvas.text_right(2, &format!("{} s", unit.sequence.seconds_left()));
     }
@@ -446,16 +475,4 @@ fn lcd(unit: &DatakomD, shown: &Shown, bank: &mut Bank) {
         }
     }
     bank.bytes(10648, canvas.datakom_bytes());
-}
-
-impl DatakomD {
-    fn mode_name(&self) -> &'static str {
-        match self.mode {
-            Mode::Stop => "STOP",
-            Mode::Run if self.identity.front == super::Front::ManualAndRun => "MANUAL",
-            Mode::Run => "RUN",
-            Mode::Auto => "AUTO",
-            Mode::Test => "TEST",
-        }
-    }
 }

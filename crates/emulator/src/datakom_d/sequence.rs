@@ -1,11 +1,16 @@
 //! The order in which a D-series unit starts, loads, unloads and stops its genset: register 10604 with timer 10606.
+//!
+//! The load changes sides by an open transition: one breaker opens, the timer of the other runs with both open, then
+//! that one is activated until its feedback says closed. Off load (8) and on load (13) last until their breaker has
+//! moved, so that the status always says what carries the load.
 
 use std::time::Duration;
 
 use crate::plant::{Controls, Plant};
 
 /// Operation statuses this imitation goes through, with their codes in register 10604. The manual's others need
-/// a second source on the busbar: synchronizing (9, 17), peak lopping (14), exporting (15), slave on load (16).
+/// a second source on the busbar: synchronizing (9, 17), load transfer (10, 18), peak lopping (14), exporting (15),
+/// slave on load (16).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Operation {
@@ -18,11 +23,9 @@ pub(super) enum Operation {
     IdleSpeed = 6,
     Heating = 7,
     OffLoad = 8,
-    TransferToGenset = 10,
     GensetBreakerActivation = 11,
     GensetBreakerTimer = 12,
     OnLoad = 13,
-    TransferToMains = 18,
     MainsBreakerActivation = 19,
     MainsBreakerTimer = 20,
     StopWithCooldown = 21,
@@ -32,15 +35,31 @@ pub(super) enum Operation {
     Stopping = 25,
 }
 
-/// What the unit wants of its genset at this moment.
+/// What the unit wants at this moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Demand {
-    /// Not running.
-    Rest,
-    /// Running with its breaker open.
-    OffLoad,
-    /// Feeding the load.
-    OnLoad,
+pub(super) struct Demand {
+    /// The engine runs.
+    pub(super) engine: bool,
+    /// What feeds the load, as far as it can.
+    pub(super) source: Source,
+}
+
+impl Demand {
+    pub(super) const REST: Self = Self { engine: false, source: Source::Mains };
+    pub(super) const ON_LOAD: Self = Self { engine: true, source: Source::Genset };
+
+    fn on_load(self) -> bool {
+        self.engine && self.source == Source::Genset
+    }
+}
+
+/// What feeds the load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Source {
+    Mains,
+    Genset,
+    /// Both breakers are open.
+    Nothing,
 }
 
 /// Seconds of the unit's timers. The cool-down is shorter than a real site's, so that it can be watched.
@@ -53,8 +72,6 @@ struct Timers {
     crank_rest: u64,
     idle_speed: u64,
     heating: u64,
-    transfer: u64,
-    breaker_activation: u64,
     breaker: u64,
     stop_decision: u64,
     cooldown: u64,
@@ -71,8 +88,6 @@ const TIMERS: Timers = Timers {
     crank_rest: 8,
     idle_speed: 4,
     heating: 5,
-    transfer: 2,
-    breaker_activation: 1,
     breaker: 2,
     stop_decision: 1,
     cooldown: 30,
@@ -111,6 +126,8 @@ pub(super) struct Sequence {
     attempts_left: u8,
     /// Latched until [`Sequence::acknowledge`].
     failed_to_start: bool,
+    /// The genset breaker opens for an immediate stop.
+    tripping: bool,
     /// Times the engine ran, since the unit was fitted.
     pub(super) runs: u32,
     /// Times the starter was engaged.
@@ -126,6 +143,7 @@ impl Sequence {
             timer: Duration::ZERO,
             attempts_left: 0,
             failed_to_start: false,
+            tripping: false,
             runs,
             cranks: runs + runs / 9,
             loads: runs - runs / 4,
@@ -141,6 +159,11 @@ impl Sequence {
         self.timer.as_millis().div_ceil(1000) as u64
     }
 
+    /// Whether the engine has been brought to speed: it can take the load, and its protections are live.
+    pub(super) fn is_up_to_speed(&self) -> bool {
+        (Operation::OffLoad as u8..=Operation::CoolingDown as u8).contains(&(self.operation as u8))
+    }
+
     pub(super) fn failed_to_start(&self) -> bool {
         self.failed_to_start
     }
@@ -150,10 +173,12 @@ impl Sequence {
         self.failed_to_start = false;
     }
 
-    /// Opens the genset breaker and closes the fuel without unloading or cooling first.
+    /// Opens the genset breaker and closes the fuel without cooling first.
     pub(super) fn stop_now(&mut self) {
-        if !matches!(self.operation, Operation::AtRest | Operation::ImmediateStop | Operation::Stopping) {
-            self.enter(Operation::ImmediateStop);
+        match self.operation {
+            Operation::AtRest | Operation::ImmediateStop | Operation::Stopping => {}
+            Operation::OnLoad => self.tripping = true,
+            _ => self.enter(Operation::ImmediateStop),
         }
     }
 
@@ -165,32 +190,39 @@ impl Sequence {
     pub(super) fn step(&mut self, dt: Duration, demand: Demand, sensed: Sensed) {
         self.timer = self.timer.saturating_sub(dt);
         if let Some(next) = self.next(demand, sensed) {
-            self.failed_to_start |= self.operation == Operation::Cranking
-                && next == Operation::Stopping
-                && demand != Demand::Rest;
+            self.failed_to_start |=
+                self.operation == Operation::Cranking && next == Operation::Stopping && demand.engine;
             self.enter(next);
         }
     }
 
     /// What the unit's outputs do in this status.
-    pub(super) fn controls(&self, mains_held_open: bool, sensed: Sensed) -> Controls {
+    pub(super) fn controls(&self, demand: Demand, sensed: Sensed) -> Controls {
         use Operation::*;
-        let on_genset = matches!(self.operation, GensetBreakerActivation | GensetBreakerTimer | OnLoad);
-        let off_mains = on_genset || matches!(self.operation, TransferToGenset | TransferToMains);
+        let to_genset = match self.operation {
+            GensetBreakerActivation => true,
+            OnLoad => demand.on_load() && !self.tripping,
+            _ => false,
+        };
+        let to_mains = match self.operation {
+            OffLoad => !takes_load(demand, sensed),
+            GensetBreakerTimer | GensetBreakerActivation | OnLoad | MainsBreakerTimer => false,
+            _ => true,
+        };
         Controls {
             fuel: !matches!(self.operation, AtRest | WaitBeforeFuel | ImmediateStop | Stopping),
             starter: self.operation == Cranking,
             idle: matches!(self.operation, IdleSpeed | IdleBeforeStop),
             // The breakers interlock: neither closes while the other's feedback says closed.
-            genset_breaker: on_genset && !sensed.mains_breaker,
-            mains_breaker: !off_mains && !mains_held_open && !sensed.genset_breaker,
+            genset_breaker: to_genset && !sensed.mains_breaker,
+            mains_breaker: to_mains && demand.source != Source::Nothing && !sensed.genset_breaker,
             ..Controls::default()
         }
     }
 
     fn next(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
         use Operation::*;
-        let wanted = demand != Demand::Rest;
+        let wanted = demand.engine;
         let elapsed = self.timer.is_zero();
         let after = |next: Operation| elapsed.then_some(next);
         match self.operation {
@@ -207,20 +239,39 @@ impl Sequence {
             IdleSpeed | Heating | OffLoad if !wanted => Some(StopWithCooldown),
             IdleSpeed => after(Heating),
             Heating => after(OffLoad),
-            OffLoad => (demand == Demand::OnLoad && sensed.genset_healthy).then_some(TransferToGenset),
-            TransferToGenset => after(GensetBreakerActivation),
-            GensetBreakerActivation => (elapsed && sensed.genset_breaker).then_some(GensetBreakerTimer),
-            GensetBreakerTimer => after(OnLoad),
-            OnLoad => (demand != Demand::OnLoad).then_some(TransferToMains),
-            TransferToMains => after(MainsBreakerActivation),
-            MainsBreakerActivation => (elapsed && sensed.mains_breaker).then_some(MainsBreakerTimer),
-            MainsBreakerTimer => after(if wanted { OffLoad } else { StopWithCooldown }),
             StopWithCooldown | CoolingDown if wanted => Some(OffLoad),
             StopWithCooldown => after(CoolingDown),
             CoolingDown => after(IdleBeforeStop),
             IdleBeforeStop => after(Stopping),
             ImmediateStop => after(Stopping),
             Stopping => (elapsed && !sensed.turning).then_some(AtRest),
+            OffLoad
+            | GensetBreakerTimer
+            | GensetBreakerActivation
+            | OnLoad
+            | MainsBreakerTimer
+            | MainsBreakerActivation => self.next_of_transfer(demand, sensed),
+        }
+    }
+
+    fn next_of_transfer(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        use Operation::*;
+        let elapsed = self.timer.is_zero();
+        let unloaded = if demand.engine { OffLoad } else { StopWithCooldown };
+        let away_from_genset = if demand.source == Source::Nothing { unloaded } else { MainsBreakerTimer };
+        match self.operation {
+            OffLoad => (takes_load(demand, sensed) && !sensed.mains_breaker).then_some(GensetBreakerTimer),
+            GensetBreakerActivation if sensed.genset_breaker => Some(OnLoad),
+            GensetBreakerTimer | GensetBreakerActivation if !demand.on_load() => Some(away_from_genset),
+            GensetBreakerTimer => elapsed.then_some(GensetBreakerActivation),
+            OnLoad if sensed.genset_breaker => None,
+            OnLoad if self.tripping => Some(ImmediateStop),
+            OnLoad => Some(away_from_genset),
+            MainsBreakerActivation if sensed.mains_breaker => Some(unloaded),
+            MainsBreakerTimer | MainsBreakerActivation if demand.on_load() => Some(GensetBreakerTimer),
+            MainsBreakerTimer | MainsBreakerActivation if demand.source == Source::Nothing => Some(unloaded),
+            MainsBreakerTimer => elapsed.then_some(MainsBreakerActivation),
+            _ => None,
         }
     }
 
@@ -237,8 +288,9 @@ impl Sequence {
             _ => {}
         }
         self.operation = next;
+        self.tripping = false;
         self.timer = Duration::from_secs(match next {
-            AtRest | OffLoad | OnLoad => 0,
+            AtRest | OffLoad | OnLoad | GensetBreakerActivation | MainsBreakerActivation => 0,
             WaitBeforeFuel => TIMERS.wait_before_fuel,
             Preheat => TIMERS.preheat,
             WaitOilFlashOff => TIMERS.oil_flash_off,
@@ -246,8 +298,6 @@ impl Sequence {
             Cranking => TIMERS.crank,
             IdleSpeed => TIMERS.idle_speed,
             Heating => TIMERS.heating,
-            TransferToGenset | TransferToMains => TIMERS.transfer,
-            GensetBreakerActivation | MainsBreakerActivation => TIMERS.breaker_activation,
             GensetBreakerTimer | MainsBreakerTimer => TIMERS.breaker,
             StopWithCooldown | ImmediateStop => TIMERS.stop_decision,
             CoolingDown => TIMERS.cooldown,
@@ -257,9 +307,16 @@ impl Sequence {
     }
 }
 
+/// Whether a genset that runs off load is to take the load, and can.
+fn takes_load(demand: Demand, sensed: Sensed) -> bool {
+    demand.on_load() && sensed.genset_healthy
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const OFF_LOAD: Demand = Demand { engine: true, source: Source::Mains };
 
     const TENTH: Duration = Duration::from_millis(100);
 
@@ -281,7 +338,7 @@ mod tests {
         let dead = Sensed::default();
         let mut walk = Vec::new();
         while walk.last() != Some(&Operation::AtRest) {
-            walk.push(until_change(&mut sequence, Demand::OffLoad, dead).0);
+            walk.push(until_change(&mut sequence, OFF_LOAD, dead).0);
         }
         use Operation::*;
         assert_eq!(
@@ -302,20 +359,20 @@ mod tests {
         assert!(sequence.failed_to_start());
         assert_eq!((sequence.runs, sequence.cranks), (100, 114));
 
-        sequence.step(TENTH, Demand::OffLoad, dead);
+        sequence.step(TENTH, OFF_LOAD, dead);
         assert_eq!(sequence.operation(), AtRest, "a latched failure keeps it at rest");
         sequence.acknowledge();
-        sequence.step(TENTH, Demand::OffLoad, dead);
+        sequence.step(TENTH, OFF_LOAD, dead);
         assert_eq!(sequence.operation(), WaitBeforeFuel);
     }
 
     #[test]
     fn the_timer_counts_down_to_the_change() {
         let mut sequence = Sequence::new(1);
-        sequence.step(TENTH, Demand::OffLoad, Sensed::default());
+        sequence.step(TENTH, OFF_LOAD, Sensed::default());
         let mut seen = vec![sequence.seconds_left()];
         while sequence.operation() == Operation::WaitBeforeFuel {
-            sequence.step(TENTH, Demand::OffLoad, Sensed::default());
+            sequence.step(TENTH, OFF_LOAD, Sensed::default());
             if sequence.operation() == Operation::WaitBeforeFuel
                 && seen.last() != Some(&sequence.seconds_left())
             {
@@ -328,27 +385,31 @@ mod tests {
     #[test]
     fn a_start_that_is_no_longer_wanted_ends_before_cranking() {
         let mut sequence = Sequence::new(1);
-        sequence.step(TENTH, Demand::OnLoad, Sensed::default());
-        sequence.step(TENTH, Demand::Rest, Sensed::default());
+        sequence.step(TENTH, Demand::ON_LOAD, Sensed::default());
+        sequence.step(TENTH, Demand::REST, Sensed::default());
         assert_eq!(sequence.operation(), Operation::AtRest);
         assert!(!sequence.failed_to_start());
     }
 
     #[test]
     fn the_breakers_are_never_commanded_closed_together() {
+        use Operation::*;
         for operation in
-            [Operation::AtRest, Operation::OnLoad, Operation::ImmediateStop, Operation::TransferToMains]
+            [AtRest, OffLoad, GensetBreakerActivation, OnLoad, MainsBreakerActivation, ImmediateStop]
         {
             for (genset_breaker, mains_breaker) in
                 [(false, false), (false, true), (true, false), (true, true)]
             {
                 let mut sequence = Sequence::new(1);
                 sequence.enter(operation);
-                let sensed = Sensed { genset_breaker, mains_breaker, ..Sensed::default() };
-                let controls = sequence.controls(false, sensed);
-                assert!(!(controls.genset_breaker && controls.mains_breaker));
-                assert!(!(controls.genset_breaker && mains_breaker), "{operation:?}");
-                assert!(!(controls.mains_breaker && genset_breaker), "{operation:?}");
+                let sensed =
+                    Sensed { genset_breaker, mains_breaker, genset_healthy: true, ..Sensed::default() };
+                for demand in [Demand::REST, OFF_LOAD, Demand::ON_LOAD] {
+                    let controls = sequence.controls(demand, sensed);
+                    assert!(!(controls.genset_breaker && controls.mains_breaker));
+                    assert!(!(controls.genset_breaker && mains_breaker), "{operation:?} {demand:?}");
+                    assert!(!(controls.mains_breaker && genset_breaker), "{operation:?} {demand:?}");
+                }
             }
         }
     }

@@ -62,6 +62,23 @@ fn each_alarm_array_has_its_flags_and_its_led() {
 }
 
 #[test]
+fn a_service_is_due_when_its_hours_or_its_days_are_used_up() {
+    for (pins, due) in [
+        (vec![], [false; 3]),
+        (vec![("service_1_hours_left", "-2")], [true, false, false]),
+        (vec![("service_2_days_left", "0")], [false, true, false]),
+        (vec![("service_2_hours_left", "0.01"), ("service_3_days_left", "-700")], [false, false, true]),
+    ] {
+        let site = Site::new(&pinned(&pins));
+        assert_eq!([36, 37, 38].map(|flag| site.flag(flag)), due, "{pins:?}");
+        let warning = site.bits("warning_alarms");
+        assert_eq!([118, 119, 120].map(|bit| warning.contains(bit)), due, "{pins:?}");
+        let any = due.contains(&true);
+        assert_eq!((site.flag(52), site.codes("leds")[2]), (any, any.into()), "{pins:?}");
+    }
+}
+
+#[test]
 fn refusals_name_the_point_and_what_is_allowed() {
     let (problem, text) = refusal("fuel_level", "7000");
     assert!(matches!(problem, PinProblem::Range { .. }));
@@ -96,7 +113,7 @@ fn other_impossible_configurations_are_refused_by_name() {
     let model = Device::new(&Config { model: Some("D-900".into()), ..Config::default() }).unwrap_err();
     assert_eq!(
         model.to_string(),
-        "`D-900` is not a model of this controller; its models are D-300, D-500, D-700"
+        "`D-900` is not a model of this controller; its models are D-300, D-500, D-545, D-700"
     );
 
     for unit in [0, 241] {

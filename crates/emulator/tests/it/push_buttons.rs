@@ -5,8 +5,8 @@ use busbar_modbus::Request;
 use crate::site::{AUTO, CHANNEL_SELECT, GCB, HARD_RESET, MCB, RUN, STOP, Site, TENTH, TEST};
 
 const START: [u32; 8] = [0, 1, 2, 3, 5, 6, 7, 8];
-const TAKE_LOAD: [u32; 4] = [10, 11, 12, 13];
-const GIVE_BACK: [u32; 4] = [13, 18, 19, 20];
+const TAKE_LOAD: [u32; 3] = [12, 11, 13];
+const GIVE_BACK: [u32; 3] = [13, 20, 19];
 const STOP_COOLED: [u32; 5] = [21, 22, 23, 25, 0];
 
 #[test]
@@ -49,10 +49,7 @@ fn the_timer_counts_down_in_every_timed_status() {
         }
         (status, timer) = (new_status, new_timer);
     }
-    assert!(
-        [1, 2, 3, 6, 7, 10, 12, 18, 20, 22, 23].iter().all(|status| counted.contains(status)),
-        "{counted:?}"
-    );
+    assert!([1, 2, 3, 6, 7, 12, 20, 22, 23].iter().all(|status| counted.contains(status)), "{counted:?}");
 }
 
 #[test]
@@ -68,16 +65,67 @@ fn run_stays_off_load_until_the_breaker_key() {
     site.press(GCB);
     assert_eq!(site.walk_to(13), [&[8][..], &TAKE_LOAD].concat());
     assert!(site.flag(4) && !site.flag(5));
-    site.press(GCB);
+    site.press(MCB);
     assert_eq!(site.walk_to(8), [&GIVE_BACK[..], &[8]].concat());
+    assert!(site.flag(5) && !site.flag(4));
+}
+
+#[test]
+fn a_breaker_key_opens_its_own_breaker_and_leaves_the_other_open() {
+    let mut site = Site::quiet();
+    let closed = |site: &Site| (site.codes("onboard_inputs")[0], site.codes("onboard_inputs")[1]);
+    site.press(RUN);
+    site.walk_to(8);
+    site.press(GCB);
+    site.walk_to(13);
+
+    site.press(GCB);
+    assert_eq!(site.walk_to(8), [13, 8]);
+    site.pass_seconds(10);
+    assert_eq!((site.code("operation_status"), closed(&site)), (8, (0, 0)));
+    assert_eq!(site.number("mains_active_power") + site.number("genset_active_power"), 0.0);
 
     site.press(MCB);
     site.pass_seconds(1);
-    assert!(!site.flag(5));
-    assert_eq!(site.number("mains_active_power"), 0.0);
+    assert_eq!(closed(&site), (0, 1));
     site.press(MCB);
     site.pass_seconds(1);
-    assert!(site.flag(5));
+    assert_eq!(closed(&site), (0, 0));
+
+    site.press(GCB);
+    assert_eq!(site.walk_to(13), [&[8][..], &TAKE_LOAD].concat());
+    site.press(AUTO);
+    assert_eq!(site.walk_to(0), [&GIVE_BACK[..], &STOP_COOLED].concat());
+    assert_eq!(closed(&site), (0, 1));
+}
+
+#[test]
+fn a_transfer_that_is_no_longer_wanted_turns_round() {
+    let mut site = Site::quiet();
+    site.press(RUN);
+    site.walk_to(8);
+    site.press(GCB);
+    site.walk_to(12);
+    site.press(MCB);
+    assert_eq!(site.walk_to(8), [12, 20, 19, 8]);
+    site.press(GCB);
+    site.walk_to(13);
+    site.press(MCB);
+    site.walk_to(20);
+    site.press(GCB);
+    assert_eq!(site.walk_to(13), [20, 12, 11, 13]);
+}
+
+#[test]
+fn the_genset_breaker_key_is_dead_until_the_engine_is_up_to_speed() {
+    let mut site = Site::quiet();
+    site.press(RUN);
+    site.walk_to(7);
+    site.press(GCB);
+    site.walk_to(8);
+    site.pass_seconds(10);
+    assert_eq!(site.code("operation_status"), 8);
+    assert!(site.flag(5) && !site.flag(4));
 }
 
 #[test]
@@ -142,7 +190,7 @@ fn stop_wins_over_other_keys_and_press_length_changes_nothing() {
 fn the_models_differ_in_their_run_key() {
     const D700_RUN: u16 = 16;
     for (model, identity, runs) in
-        [("D-300", 0xD300, RUN), ("D-500", 0xD500, RUN), ("D-700", 0xD700, D700_RUN)]
+        [("D-500", 0xD500, RUN), ("D-545", 0xD545, RUN), ("d-545", 0xD545, RUN), ("D-700", 0xD700, D700_RUN)]
     {
         let mut site = Site::model(model);
         assert_eq!(site.code("device_identity"), identity);
@@ -150,6 +198,15 @@ fn the_models_differ_in_their_run_key() {
         assert_eq!(site.code("unit_mode"), 2, "{model}");
         assert_eq!(site.walk_to(8), START, "{model}");
     }
+
+    let mut site = Site::model("D-300");
+    assert_eq!(site.code("device_identity"), 0xD300);
+    for keys in [RUN, D700_RUN] {
+        site.press(keys);
+        assert_eq!(site.code("unit_mode"), 4, "the manual gives a D-300 neither key");
+    }
+    site.press(TEST);
+    assert_eq!(site.walk_to(8), START);
 
     let mut site = Site::model("D-700");
     site.press(RUN);

@@ -120,6 +120,24 @@ async fn garbage_is_counted_and_answered_by_nothing() {
 }
 
 #[tokio::test]
+async fn function_0_is_an_illegal_function_and_functions_above_127_are_none() {
+    let emulation = start(loopback(&[0])).await.unwrap();
+    let mut stream = connect(&emulation).await;
+    stream.write_all(&[1, 2, 0, 0, 0, 6, 1, 0, 0x28, 0, 0, 1]).await.unwrap();
+    assert_eq!(receive(&mut stream, 9).await, [1, 2, 0, 0, 0, 3, 1, 0x80, 1]);
+    // Nothing but its code, to another unit, and what only a server sends: the next answer is to the last one.
+    stream.write_all(&[0, 2, 0, 0, 0, 2, 1, 0]).await.unwrap();
+    assert_eq!(receive(&mut stream, 9).await, [0, 2, 0, 0, 0, 3, 1, 0x80, 1]);
+    stream.write_all(&[0, 3, 0, 0, 0, 2, 9, 0]).await.unwrap();
+    stream.write_all(&[0, 4, 0, 0, 0, 3, 1, 0x80, 1]).await.unwrap();
+    stream.write_all(&[0, 5, 0, 0, 0, 2, 1, 0xFF]).await.unwrap();
+    stream.write_all(&read_frame(6, 1, 10609, 1)).await.unwrap();
+    assert_eq!(receive(&mut stream, 11).await[..2], [0, 6]);
+    let statistics = emulation.statistics();
+    assert_eq!((statistics.requests, statistics.answers, statistics.garbage), (4, 3, 2));
+}
+
+#[tokio::test]
 async fn a_hard_reset_answers_drops_everybody_and_comes_back() {
     // 4 simulated seconds of silence are 40 ms.
     let emulation = start(Config { speed: 100.0, ..loopback(&[0]) }).await.unwrap();

@@ -133,6 +133,7 @@ fn functions_other_than_3_6_and_16_are_illegal() {
         Request::ReadInputRegisters { address: 10240, count: 1 },
         Request::WriteSingleCoil { address: 8193, value: 0xFF00 },
         Request::WriteMultipleCoils { address: 8193, coils },
+        Request::Other { function: 0, data: &[0x28, 0, 0, 1] },
         Request::Other { function: 0x2B, data: &[0x0E, 1, 0] },
         Request::Other { function: 0x17, data: &[] },
     ] {
