@@ -5,8 +5,18 @@ use std::sync::LazyLock;
 use crate::profile::Profile;
 
 /// File name and text of each built-in profile.
-const SOURCES: &[(&str, &str)] =
-    &[("profiles/datakom-d/profile.toml", include_str!("../../../profiles/datakom-d/profile.toml"))];
+const SOURCES: &[(&str, &str)] = &[
+    ("profiles/datakom-d/profile.toml", include_str!("../../../profiles/datakom-d/profile.toml")),
+    ("profiles/datakom-dkg705/profile.toml", include_str!("../../../profiles/datakom-dkg705/profile.toml")),
+    (
+        "profiles/smartgen-acc1700/profile.toml",
+        include_str!("../../../profiles/smartgen-acc1700/profile.toml"),
+    ),
+    (
+        "profiles/smartgen-hat821si/profile.toml",
+        include_str!("../../../profiles/smartgen-hat821si/profile.toml"),
+    ),
+];
 
 /// Every built-in profile, in the order of their keys.
 ///

@@ -11,8 +11,8 @@ use toml::Spanned;
 
 use crate::number::Number;
 use crate::terms::{
-    Access, Class, Confirm, DataType, DeviceProof, Kind, OverRead, Parity, Rate, Risk, Role, SignalKind,
-    Transport, WordOrder,
+    Access, ArgKind, Class, Confirm, DataType, DeviceProof, Kind, OverRead, Parity, Rate, Risk, Role,
+    SignalKind, Transport, WordOrder,
 };
 
 /// A value and where it stands in the text. Not `Clone`, so that `clone` gives the value.
@@ -154,6 +154,9 @@ pub(crate) struct ProfileFile {
     pub(crate) bits: BTreeMap<At<String>, BitListFile>,
     /// Groups of points, in the order of a page.
     pub(crate) groups: Vec<At<GroupFile>>,
+    /// Signals that several points make up.
+    #[serde(default)]
+    pub(crate) joined: Vec<At<JoinedFile>>,
     /// Coils that function 5 writes.
     #[serde(default)]
     pub(crate) coils: Vec<At<CoilFile>>,
@@ -428,15 +431,72 @@ pub(crate) struct CommandFile {
     /// If all of this holds, the state is there already and nothing is sent.
     #[serde(default)]
     pub(crate) already: Vec<At<ConditionFile>>,
-    /// The write, sent once.
-    pub(crate) write: At<WriteFile>,
+    /// What is waited for before the first write.
+    pub(crate) hold: Option<At<HoldFile>>,
+    /// The write, sent once; this or `steps`.
+    pub(crate) write: Option<At<WriteFile>>,
+    /// The writes of a procedure in their order, each sent once; this or `write`.
+    pub(crate) steps: Option<At<Vec<At<StepFile>>>>,
     /// What shows the effect, step by step; this or `no_proof`.
     pub(crate) proof: Option<At<Vec<At<ProofFile>>>>,
     /// Why nothing shows the effect; this or `proof`.
     pub(crate) no_proof: Option<At<String>>,
 }
 
-/// An argument of a command: `choices`, or `min` and `max`.
+/// One write of a procedure.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct StepFile {
+    /// What must hold, also while `hold` is waited for, or the procedure ends before this step.
+    #[serde(default)]
+    pub(crate) require: Vec<At<ConditionFile>>,
+    /// If all of this holds, the step is left out.
+    #[serde(default)]
+    pub(crate) already: Vec<At<ConditionFile>>,
+    /// What is waited for before the write.
+    pub(crate) hold: Option<At<HoldFile>>,
+    /// The write, sent once.
+    pub(crate) write: At<WriteFile>,
+    /// What must show before the next step.
+    #[serde(default)]
+    pub(crate) proof: Vec<At<ProofFile>>,
+}
+
+/// What is waited for before a write: `all` at once, or `any`, within a time.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct HoldFile {
+    /// All of this at once.
+    #[serde(default)]
+    pub(crate) all: Vec<At<HoldConditionFile>>,
+    /// One of this.
+    #[serde(default)]
+    pub(crate) any: Vec<At<HoldConditionFile>>,
+    /// How long it may take, in seconds; then the write is not sent.
+    pub(crate) within_s: At<u16>,
+}
+
+/// A comparison of a point, or of an argument, with exactly one of `equals`, `not_equals`, `between`, `equals_arg`.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct HoldConditionFile {
+    /// Id of the point; this or `arg`.
+    pub(crate) point: Option<At<String>>,
+    /// Name of the argument, `time.second` for a part of a time as it runs; this or `point`.
+    pub(crate) arg: Option<At<String>>,
+    /// Number of the bit, where the point is a set of them.
+    pub(crate) bit: Option<At<u16>>,
+    /// Raw code that it is.
+    pub(crate) equals: Option<u32>,
+    /// Raw code that it is not.
+    pub(crate) not_equals: Option<u32>,
+    /// Inclusive range of raw codes.
+    pub(crate) between: Option<At<(u32, u32)>>,
+    /// Name of the argument that it equals.
+    pub(crate) equals_arg: Option<At<String>>,
+}
+
+/// An argument of a command: `choices`, or `min` and `max`, or `kind`.
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ArgFile {
@@ -448,7 +508,9 @@ pub(crate) struct ArgFile {
     pub(crate) min: Option<u16>,
     /// Greatest number.
     pub(crate) max: Option<u16>,
-    /// What it is when it is not given; it must be given where this is left out.
+    /// `time`: a local date and time, whose parts are NAME.year (two digits), .month, .day, .hour, .minute, .second.
+    pub(crate) kind: Option<At<ArgKind>>,
+    /// What it is when it is not given (`now` for a time); it must be given where this is left out.
     pub(crate) default: Option<At<String>>,
 }
 
@@ -474,7 +536,7 @@ pub(crate) struct WriteFile {
     pub(crate) value: Option<At<u16>>,
     /// The value by what a point reads just before; not together with `value`.
     pub(crate) value_by: Option<At<ValueByFile>>,
-    /// Name of the argument whose number is OR-ed onto the value.
+    /// Name of the argument whose number is OR-ed onto the value; `time.year` for a part of a time.
     pub(crate) arg: Option<At<String>>,
 }
 
@@ -536,8 +598,39 @@ pub(crate) struct ProofFile {
     pub(crate) changes: Option<At<bool>>,
     /// What the device as a whole does, in place of a point.
     pub(crate) device: Option<DeviceProof>,
+    /// A joined clock, in place of a point; `equals_arg` names the time, which is compared as it runs.
+    pub(crate) joined: Option<At<String>>,
+    /// How far the clock may be from the time, in seconds.
+    pub(crate) tolerance_s: Option<At<u16>>,
     /// How long it may take, in seconds.
     pub(crate) within_s: At<u16>,
+}
+
+/// A signal that several points make up: hours from `hours`, `minutes` and perhaps `seconds`, or a clock from the six
+/// others.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct JoinedFile {
+    /// Id of the signal in the vocabulary: a number in h, or a clock.
+    pub(crate) signal: At<String>,
+    /// Id of the point of whole hours.
+    pub(crate) hours: Option<At<String>>,
+    /// Id of the point of minutes beside them.
+    pub(crate) minutes: Option<At<String>>,
+    /// Id of the point of seconds beside them.
+    pub(crate) seconds: Option<At<String>>,
+    /// Id of the point of the year, counted from 2000.
+    pub(crate) year: Option<At<String>>,
+    /// Id of the point of the month.
+    pub(crate) month: Option<At<String>>,
+    /// Id of the point of the day of the month.
+    pub(crate) day: Option<At<String>>,
+    /// Id of the point of the hour.
+    pub(crate) hour: Option<At<String>>,
+    /// Id of the point of the minute.
+    pub(crate) minute: Option<At<String>>,
+    /// Id of the point of the second.
+    pub(crate) second: Option<At<String>>,
 }
 
 /// The vocabulary that all profiles share.

@@ -19,14 +19,17 @@
 //! There is no I/O in here but the compiled-in text, and no clock.
 
 mod builtin;
+mod clock;
 mod codec;
 pub mod command;
 mod file;
 mod findings;
 mod image;
+mod joined;
 pub mod lcd;
 mod load;
 mod number;
+pub mod page;
 pub mod plan;
 mod point;
 mod profile;
@@ -40,10 +43,12 @@ mod value;
 pub mod vocabulary;
 
 pub use builtin::{builtin, builtins};
+pub use clock::{DateTime, ParseDateTimeError};
 pub use codec::EncodeError;
 pub use command::Command;
 pub use findings::{Finding, Findings};
 pub use image::Image;
+pub use joined::{Joined, JoinedParts, JoinedReading, JoinedValue};
 pub use number::{Number, ParseNumberError, Scale};
 pub use point::{Bit, Choice, Point};
 pub use profile::{
@@ -52,7 +57,7 @@ pub use profile::{
 pub use reading::{Reading, Shown, decode_window, no_reading, reading};
 pub use schema::json_schema;
 pub use terms::{
-    Access, Class, Confirm, DataType, DeviceProof, Kind, OverRead, Parity, Quality, Rate, Risk, Role,
-    SignalKind, Transport, UnknownWord, WordOrder,
+    Access, ArgKind, Class, Confirm, DataType, DeviceProof, Kind, OverRead, Parity, Quality, Rate, Risk,
+    Role, SignalKind, TimePart, Transport, UnknownWord, WordOrder,
 };
 pub use value::{BitSet, Decoded, Value};

@@ -4,9 +4,9 @@
 //! hole of documented registers is bridged when that is cheaper than another read. The plan is computed by
 //! dynamic programming over the wanted items in address order, in O(items x registers a read).
 
-use std::{collections::BTreeSet, time::Duration};
+use std::time::Duration;
 
-use crate::{Access, Profile};
+use crate::{Profile, Rate};
 
 /// One read request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -23,6 +23,16 @@ impl Read {
     /// The address behind the last register of the read.
     fn end(self) -> u32 {
         u32::from(self.address) + u32::from(self.count)
+    }
+
+    /// Characters of the request (8) and of its full answer (5 and the registers) on a serial line.
+    pub fn characters(self) -> u64 {
+        Cost::RTU_READ_CHARACTERS + 2 * u64::from(self.count)
+    }
+
+    /// Bytes of the request (12) and of its full answer (9 and the registers) over Modbus TCP.
+    pub fn tcp_bytes(self) -> u64 {
+        21 + 2 * u64::from(self.count)
     }
 
     /// Whether all of `registers` registers from `address` on are part of this read.
@@ -68,9 +78,21 @@ impl Cost {
         }
     }
 
+    /// The same, with the pause that a device wants after each of its reads: for a wire that has nobody else to serve
+    /// meanwhile, where few reads are worth more than few characters.
+    pub fn spaced(self, spacing: Duration) -> Self {
+        let spacing = u64::try_from(spacing.as_nanos()).unwrap_or(u64::MAX);
+        Self { read: self.read.saturating_add(spacing), ..self }
+    }
+
     /// What reading `count` registers costs.
     pub fn of(self, count: u16) -> u64 {
         self.read.saturating_add(self.register.saturating_mul(u64::from(count)))
+    }
+
+    /// What these reads cost together.
+    pub fn total(self, reads: &[Read]) -> u64 {
+        reads.iter().fold(0, |total, read| total.saturating_add(self.of(read.count)))
     }
 }
 
@@ -81,8 +103,8 @@ pub struct Planner {
     function: u8,
     limit: u16,
     map: Vec<(u16, u16)>,
-    /// No read may hold both the register before such an address and the register at it.
-    splits: BTreeSet<u16>,
+    /// Ascending. No read of several items holds both the register before such an address and the register at it.
+    splits: Vec<u16>,
 }
 
 impl Planner {
@@ -97,39 +119,78 @@ impl Planner {
     /// A planner over any map of inclusive, ascending address ranges, with at most `limit` registers a read; reads
     /// use function 3.
     pub fn over(map: &[(u16, u16)], limit: u16, cost: Cost) -> Self {
-        Self { cost, function: 3, limit: limit.max(1), map: map.to_vec(), splits: BTreeSet::new() }
+        Self { cost, function: 3, limit: limit.max(1), map: map.to_vec(), splits: Vec::new() }
     }
 
-    /// Forbids reads across `address`: no later plan holds it together with the register before it.
+    /// Forbids reads across `address`: no later plan holds it together with the register before it, unless one item
+    /// does, which then is read alone.
     pub fn split_at(&mut self, address: u16) {
-        self.splits.insert(address);
+        if let Err(place) = self.splits.binary_search(&address) {
+            self.splits.insert(place, address);
+        }
     }
 
     /// The cheapest reads that cover every item, in address order. An item is an address and a number of registers,
     /// and comes in one read unless it is longer than a read may be; then it comes in parts. Items outside the map
     /// are left out.
     pub fn reads(&self, items: impl IntoIterator<Item = (u16, u16)>) -> Vec<Read> {
-        let items = self.pieces(items);
-        // best[i]: the least cost of the first i items, the number of reads, and the item its last read starts with.
-        let mut best = vec![(0_u64, 0_u32, 0_usize)];
-        for last in 0..items.len() {
-            let mut least = (u64::MAX, u32::MAX, last);
+        let pieces = self.pieces(items);
+        let best = self.best(&pieces);
+        let mut reads = Vec::new();
+        let mut behind = pieces.len();
+        while behind > 0 {
+            let Best { first, count, .. } = best[behind];
+            reads.push(Read { function: self.function, address: pieces[first].address, count });
+            behind = first;
+        }
+        reads.reverse();
+        reads
+    }
+
+    /// The least that any reads which cover every item could cost.
+    pub fn least(&self, items: impl IntoIterator<Item = (u16, u16)>) -> u64 {
+        self.best(&self.pieces(items)).last().map_or(0, |best| best.cost)
+    }
+
+    /// One plan for all points of `profile` that are due at the same moment, whatever their rates: never dearer than
+    /// a plan for each rate.
+    pub fn due(&self, profile: &Profile, rates: &[Rate]) -> Due {
+        let is_due = |index: &usize| rates.contains(&profile.points[*index].rate);
+        let points: Vec<usize> = (0..profile.points.len()).filter(is_due).collect();
+        let reads = self.reads(items(profile, &points));
+        let brought = |index: &usize| {
+            let point = &profile.points[*index];
+            point.access.is_readable() && reads.iter().any(|read| read.covers(point.address, point.registers))
+        };
+        let besides = (0..profile.points.len()).filter(|index| !is_due(index)).filter(brought).collect();
+        Due { reads, besides }
+    }
+
+    /// For each number of pieces, from none to all: the cheapest way to read the first so many.
+    fn best(&self, pieces: &[Piece]) -> Vec<Best> {
+        let mut best = Vec::with_capacity(pieces.len() + 1);
+        best.push(Best { cost: 0, registers: 0, first: 0, count: 0 });
+        for (last, piece) in pieces.iter().enumerate() {
+            let mut least: Option<Best> = None;
             let mut end = 0;
-            for first in (0..=last).rev() {
-                end = end.max(items[first].end());
-                let count = end - u32::from(items[first].address);
-                if items[first].range != items[last].range || !self.allowed(items[first].address, count) {
+            for (first, from) in pieces[..=last].iter().enumerate().rev() {
+                end = end.max(from.end());
+                let count = end - u32::from(from.address);
+                if from.zones != piece.zones || count > u32::from(self.limit) {
                     break;
                 }
-                let (cost, reads, _) = best[first];
-                let whole = (cost.saturating_add(self.cost.of(count as u16)), reads + 1, first);
-                if (whole.0, whole.1) < (least.0, least.1) {
-                    least = whole;
+                let count = count as u16;
+                let cost = best[first].cost.saturating_add(self.cost.of(count));
+                let registers = best[first].registers + u32::from(count);
+                let way = Best { cost, registers, first, count };
+                if least.is_none_or(|least| (way.cost, way.registers) < (least.cost, least.registers)) {
+                    least = Some(way);
                 }
             }
-            best.push(least);
+            // A piece alone is always allowed, so that there is a way.
+            best.extend(least);
         }
-        self.unwind(&items, &best)
+        best
     }
 
     /// Cuts items that are longer than a read, drops those outside the map, sorts the rest.
@@ -137,14 +198,14 @@ impl Planner {
         let mut pieces = Vec::new();
         for (address, registers) in items {
             let Some(range) = self.range(address, registers) else { continue };
-            if self.allowed(address, u32::from(registers)) {
-                pieces.push(Piece { address, registers, range });
+            let last = address + (registers - 1);
+            // Ranges and splits both ascend, so that their sum tells any two zones apart.
+            let zone = |address: u16| range + self.splits.partition_point(|split| *split <= address);
+            if registers <= self.limit {
+                pieces.push(Piece { address, registers, zones: (zone(address), zone(last)) });
             } else {
-                pieces.extend((address..=address + (registers - 1)).map(|address| Piece {
-                    address,
-                    registers: 1,
-                    range,
-                }));
+                let part = |address| Piece { address, registers: 1, zones: (zone(address), zone(address)) };
+                pieces.extend((address..=last).map(part));
             }
         }
         pieces.sort_unstable_by_key(|piece| (piece.address, piece.registers));
@@ -158,29 +219,16 @@ impl Planner {
         let range = self.map.partition_point(|(_, end)| *end < address);
         self.map.get(range).is_some_and(|(start, end)| *start <= address && last <= *end).then_some(range)
     }
+}
 
-    fn allowed(&self, address: u16, count: u32) -> bool {
-        count <= u32::from(self.limit)
-            && self
-                .splits
-                .range(address.saturating_add(1)..)
-                .next()
-                .is_none_or(|split| u32::from(*split) >= u32::from(address) + count)
-    }
-
-    fn unwind(&self, items: &[Piece], best: &[(u64, u32, usize)]) -> Vec<Read> {
-        let mut reads = Vec::new();
-        let mut behind = items.len();
-        while behind > 0 {
-            let first = best[behind].2;
-            let address = items[first].address;
-            let end = items[first..behind].iter().map(|item| item.end()).max().unwrap_or_default();
-            reads.push(Read { function: self.function, address, count: (end - u32::from(address)) as u16 });
-            behind = first;
-        }
-        reads.reverse();
-        reads
-    }
+/// The reads for what is due at one moment.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Due {
+    /// The reads, in address order.
+    pub reads: Vec<Read>,
+    /// Indexes of the points that are not due and that one of the reads brings whole.
+    pub besides: Vec<usize>,
 }
 
 /// The cheapest reads for the points with these indexes, at the cost of the controller's usual serial line
@@ -195,7 +243,7 @@ pub fn items<'a>(profile: &'a Profile, points: &'a [usize]) -> impl Iterator<Ite
     points
         .iter()
         .filter_map(|index| profile.points.get(*index))
-        .filter(|point| point.access != Access::Write)
+        .filter(|point| point.access.is_readable())
         .map(|point| (point.address, point.registers))
 }
 
@@ -204,11 +252,24 @@ pub fn items<'a>(profile: &'a Profile, points: &'a [usize]) -> impl Iterator<Ite
 struct Piece {
     address: u16,
     registers: u16,
-    range: usize,
+    /// The stretches of the map, between gaps and splits, of its first and its last register.
+    zones: (usize, usize),
 }
 
 impl Piece {
     fn end(self) -> u32 {
         u32::from(self.address) + u32::from(self.registers)
     }
+}
+
+/// The cheapest way to read a number of pieces.
+#[derive(Clone, Copy)]
+struct Best {
+    cost: u64,
+    /// Of equally cheap plans the one with the fewest characters is taken.
+    registers: u32,
+    /// The piece that its last read starts with.
+    first: usize,
+    /// Registers of its last read.
+    count: u16,
 }

@@ -105,9 +105,11 @@ impl Point {
         self.address.saturating_add(self.registers - 1)
     }
 
-    /// The number that PLC programs know the first register by.
+    /// The number that PLC programs know the first register by: 40001 for address 0 on, and 410000 for 9999 on,
+    /// where five digits do not reach.
     pub const fn plc_number(&self) -> u32 {
-        40_001 + self.address as u32
+        let first = if self.address <= 9998 { 40_001 } else { 400_001 };
+        first + self.address as u32
     }
 
     /// The choice behind a code.

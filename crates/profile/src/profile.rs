@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use crate::command::Command;
 use crate::findings::Findings;
+use crate::joined::Joined;
 use crate::number::Number;
 use crate::point::Point;
 use crate::terms::{Kind, OverRead, Parity, Rate, Transport, WordOrder};
@@ -39,6 +40,7 @@ pub struct Profile {
     /// Remote commands.
     pub commands: Vec<Command>,
     pub(crate) by_id: HashMap<String, usize>,
+    pub(crate) joined: Vec<Joined>,
 }
 
 impl Profile {
@@ -95,6 +97,11 @@ impl Profile {
             let bit = point.bits.iter().find(|bit| bit.signal.as_deref() == Some(signal))?;
             Some((point, bit.bit))
         })
+    }
+
+    /// Signals that several points make up, in the order of the file.
+    pub fn joined(&self) -> &[Joined] {
+        &self.joined
     }
 
     /// The points that lie wholly inside a window, in address order.
@@ -290,6 +297,11 @@ mod tests {
     fn names_lead_to_things() {
         let profile = sample();
         assert_eq!(profile.point("power").unwrap().plc_number(), 40_002);
+        let mut point = profile.point("power").unwrap().clone();
+        for (address, number) in [(9998, 49_999), (9999, 410_000), (10246, 410_247), (65535, 465_536)] {
+            point.address = address;
+            assert_eq!(point.plc_number(), number);
+        }
         assert!(profile.point("none").is_none());
         assert_eq!(profile.model(0xA), Some("A"));
         assert_eq!(profile.model(0xB), None);
@@ -298,7 +310,7 @@ mod tests {
         assert_eq!(profile.signal("genset.l1.voltage").unwrap().id, "voltage");
         let (options, bit) = profile.flag("breaker.genset.closed").unwrap();
         assert_eq!((options.id.as_str(), bit), ("options", 3));
-        assert_eq!(profile.command("load").unwrap().write.address, 3);
+        assert_eq!(profile.command("load").unwrap().steps[0].write.address, 3);
         assert_eq!(profile.group(options).title, "Engine");
         let status = profile.point("status").unwrap();
         assert_eq!(profile.points[status.timer.unwrap()].id, "delay");

@@ -6,7 +6,7 @@ use crate::command::{Arg, ArgValues};
 use crate::number::{Number, Scale};
 use crate::point::Point;
 use crate::profile::Profile;
-use crate::terms::{Access, Class, DataType, Kind, OverRead, Parity, Transport, WordOrder};
+use crate::terms::{Access, ArgKind, Class, DataType, Kind, OverRead, Parity, Transport, WordOrder};
 
 /// One line of `profile list`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -277,7 +277,7 @@ pub struct CommandShow<'a> {
     pub args: Vec<ArgShow<'a>>,
 }
 
-/// An argument of a command: `choices`, or `min` and `max`.
+/// An argument of a command: `choices`, or `min` and `max`, or `kind`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ArgShow<'a> {
@@ -292,6 +292,9 @@ pub struct ArgShow<'a> {
     /// Greatest number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<u16>,
+    /// What else it is: a time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kind: Option<ArgKind>,
     /// What it is when it is not given; null where it must be given.
     pub default: Option<DefaultShow<'a>>,
 }
@@ -300,7 +303,7 @@ pub struct ArgShow<'a> {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum DefaultShow<'a> {
-    /// One of the choices.
+    /// One of the choices, or `now`.
     Choice(&'a str),
     /// A number.
     Number(u16),
@@ -314,6 +317,7 @@ impl<'a> ArgShow<'a> {
                 choices: choices.iter().map(|choice| choice.id.as_str()).collect(),
                 min: None,
                 max: None,
+                kind: None,
                 default: choices
                     .iter()
                     .find(|choice| Some(choice.value) == arg.default)
@@ -324,7 +328,16 @@ impl<'a> ArgShow<'a> {
                 choices: Vec::new(),
                 min: Some(*range.start()),
                 max: Some(*range.end()),
+                kind: None,
                 default: arg.default.map(DefaultShow::Number),
+            },
+            ArgValues::Time { now } => Self {
+                name: &arg.name,
+                choices: Vec::new(),
+                min: None,
+                max: None,
+                kind: Some(ArgKind::Time),
+                default: now.then_some(DefaultShow::Choice("now")),
             },
         }
     }

@@ -272,6 +272,45 @@ words! {
 }
 
 words! {
+    /// One number of a date and time.
+    TimePart {
+        /// Year, two digits.
+        Year = "year",
+        /// Month, 1 to 12.
+        Month = "month",
+        /// Day of the month.
+        Day = "day",
+        /// Hour of the day.
+        Hour = "hour",
+        /// Minute of the hour.
+        Minute = "minute",
+        /// Second of the minute.
+        Second = "second",
+    }
+}
+
+impl TimePart {
+    /// The least and the greatest that it can be.
+    pub const fn range(self) -> (u16, u16) {
+        match self {
+            Self::Year => (0, 99),
+            Self::Month => (1, 12),
+            Self::Day => (1, 31),
+            Self::Hour => (0, 23),
+            Self::Minute | Self::Second => (0, 59),
+        }
+    }
+}
+
+words! {
+    /// An argument that is neither a choice nor a number.
+    ArgKind {
+        /// A local date and time; it runs on while the command does.
+        Time = "time",
+    }
+}
+
+words! {
     /// What a signal of the vocabulary carries.
     SignalKind {
         /// A number in the signal's unit.

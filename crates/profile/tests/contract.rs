@@ -178,6 +178,14 @@ fn show_has_the_keys_of_the_contract() {
 }
 
 #[test]
+fn a_time_is_shown_by_its_kind() {
+    let shown = serde_json::to_value(ProfileShow::new(builtin("datakom-dkg705").unwrap())).unwrap();
+    let commands = shown["commands"].as_array().unwrap();
+    let command = commands.iter().find(|command| command["id"] == "set_clock").unwrap();
+    assert_eq!(command["args"], json!([{ "name": "time", "kind": "time", "default": "now" }]));
+}
+
+#[test]
 fn the_summary_counts_every_bit_of_every_array() {
     let summary = serde_json::to_value(ProfileSummary::new(&sample())).unwrap();
     assert_eq!(

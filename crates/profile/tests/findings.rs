@@ -6,8 +6,11 @@ use std::fmt::Write as _;
 use busbar_profile::vocabulary::Vocabulary;
 use busbar_profile::{Findings, Profile};
 
-/// A profile that uses every key and has no mistake.
+/// A profile that uses every key but those of [`PROCEDURES`], and has no mistake.
 const SOUND: &str = include_str!("sound.toml");
+
+/// A profile that uses the keys of procedures and joined signals, and has no mistake.
+const PROCEDURES: &str = include_str!("procedures.toml");
 
 fn findings_of(text: &str) -> Result<Profile, Findings> {
     Profile::parse("profile.toml", text)
@@ -15,15 +18,23 @@ fn findings_of(text: &str) -> Result<Profile, Findings> {
 
 /// The sound profile with one text in it replaced.
 fn edited(from: &str, to: &str) -> String {
-    assert_eq!(SOUND.matches(from).count(), 1, "`{from}` must stand once in sound.toml");
-    SOUND.replacen(from, to, 1)
+    edited_of(SOUND, from, to)
+}
+
+fn edited_of(sound: &str, from: &str, to: &str) -> String {
+    assert_eq!(sound.matches(from).count(), 1, "`{from}` must stand once in the file");
+    sound.replacen(from, to, 1)
 }
 
 /// What is found in each edit of the sound profile.
 fn report(edits: &[(&str, &str)]) -> String {
+    report_of(SOUND, edits)
+}
+
+fn report_of(sound: &str, edits: &[(&str, &str)]) -> String {
     let mut report = String::new();
     for (from, to) in edits {
-        let findings = match findings_of(&edited(from, to)) {
+        let findings = match findings_of(&edited_of(sound, from, to)) {
             Ok(_) => panic!("nothing is found when `{from}` becomes `{to}`"),
             Err(findings) => findings,
         };
@@ -315,6 +326,101 @@ fn coils_and_commands() {
             ("name = \"channel\", min = 0, max = 19 },", "name = \"press\", min = 0, max = 19 },"),
             ("max = 19, default = \"3\"", "max = 19, default = \"20\""),
         ]),
+    );
+}
+
+#[test]
+fn procedures() {
+    let profile = findings_of(PROCEDURES).unwrap_or_else(|findings| panic!("{findings}"));
+    assert_eq!(profile.commands.iter().map(|command| command.steps.len()).collect::<Vec<_>>(), [2, 1, 2]);
+    let steps = "  { write = { function = 6, address = 14, arg = \"time.minute\" }, proof = [{ point = \"minute\", equals_arg = \"time.minute\", within_s = 2 }] },\n  { write = { function = 6, address = 15, arg = \"time.second\" } },\n";
+    let second = "{ arg = \"time.second\", between = [5, 45] }";
+    let clock = "{ joined = \"clock\", equals_arg = \"time\", tolerance_s = 2, within_s = 5 }";
+    check(
+        "procedures",
+        report_of(
+            PROCEDURES,
+            &[
+                ("kind = \"time\"", "kind = \"date\""),
+                ("kind = \"time\"", "kind = \"time\", min = 0, max = 9"),
+                ("default = \"now\"", "default = \"noon\""),
+                (steps, ""),
+                (
+                    "bit = 1, equals = 1 }, { point = \"status\", equals = 1 }], within_s = 300 }\nwrite = {",
+                    "bit = 1, equals = 1 }], within_s = 300 }\nrite = {",
+                ),
+                (
+                    "write = { function = 5, address = 0, value = 0xFF00 }\nproof = [{ point = \"status\", between",
+                    "proof = [{ point = \"status\", between",
+                ),
+                (
+                    "write = { function = 5, address = 0, value = 0xFF00 }\nproof = [{ point = \"status\", between",
+                    "steps = []\nwrite = { function = 5, address = 0, value = 0xFF00 }\nproof = [{ point = \"status\", between",
+                ),
+                (
+                    "  { write = { function = 6, address = 14,",
+                    "  { hold = { any = [{ point = \"status\", equals = 1 }], within_s = 9 }, write = { function = 6, address = 14,",
+                ),
+                ("address = 15, arg = \"time.second\"", "address = 16, arg = \"time.second\""),
+                ("address = 15, arg = \"time.second\"", "address = 15, arg = \"time\""),
+                ("address = 15, arg = \"time.second\"", "address = 15, arg = \"time.seconds\""),
+                ("address = 15, arg = \"time.second\"", "address = 15, arg = \"channel.second\""),
+                ("address = 15, arg = \"time.second\"", "address = 15, arg = \"tine.second\""),
+                ("equals_arg = \"time.year\"", "equals_arg = \"time\""),
+                (second, "{ arg = \"time.second\", between = [5, 70] }"),
+                (second, "{ arg = \"time.second\", bit = 1, equals = 1 }"),
+                (second, "{ arg = \"time.second\", point = \"status\", equals = 1 }"),
+                (second, "{ equals = 1 }"),
+                (second, "{ arg = \"time.second\", changes = true }"),
+                ("within_s = 300", "within_s = 0"),
+                ("within_s = 300", "all = [{ point = \"status\", equals = 1 }], within_s = 300"),
+                ("{ all = [{ point = \"status\", equals = 1 }], within_s = 30 }", "{ within_s = 30 }"),
+                (clock, "{ joined = \"clock\", equals_arg = \"time\", within_s = 5 }"),
+                (clock, "{ joined = \"clock\", tolerance_s = 2, within_s = 5 }"),
+                (clock, "{ joined = \"clock\", equals_arg = \"channel\", tolerance_s = 2, within_s = 5 }"),
+                (
+                    clock,
+                    "{ joined = \"engine.hours\", equals_arg = \"time\", tolerance_s = 2, within_s = 5 }",
+                ),
+                (
+                    clock,
+                    "{ joined = \"clock\", equals = 5, equals_arg = \"time\", tolerance_s = 2, within_s = 5 }",
+                ),
+                (clock, "{ point = \"status\", equals = 1, tolerance_s = 2, within_s = 5 }"),
+                (clock, "{ device = \"silent_then_back\", equals_arg = \"time\", within_s = 5 }"),
+            ],
+        ),
+    );
+}
+
+#[test]
+fn joined_signals() {
+    check(
+        "joined_signals",
+        report_of(
+            PROCEDURES,
+            &[
+                ("signal = \"engine.hours\"", "signal = \"engine.ours\""),
+                ("signal = \"engine.hours\"", "signal = \"fuel.total\""),
+                ("signal = \"engine.hours\"", "signal = \"mode\""),
+                ("signal = \"engine.hours\"", "signal = \"clock\""),
+                ("signal = \"engine.hours\"", "signal = \"src1.supply.hours\""),
+                ("signal = \"engine.hours\"", "signals = \"engine.hours\""),
+                ("signal = \"clock\"", "signal = \"engine.run.hours\""),
+                ("hours = \"run_hours\"\n", ""),
+                ("minutes = \"run_minutes\"\n", ""),
+                ("second = \"second\"\n", ""),
+                ("second = \"second\"\n", "second = \"second\"\nhours = \"run_hours\"\n"),
+                ("seconds = \"run_seconds\"", "seconds = \"run_second\""),
+                ("seconds = \"run_seconds\"", "seconds = \"run_minutes\""),
+                ("hours = \"run_hours\"", "hours = \"fuel\""),
+                ("second = \"second\"\n", "second = \"flags\"\n"),
+                (
+                    "unit = \"h\", name = \"Hours run\"",
+                    "unit = \"h\", signal = \"engine.hours\", name = \"Hours run\"",
+                ),
+            ],
+        ),
     );
 }
 

@@ -1,34 +1,35 @@
 //! Checks of the remote commands.
 
-use std::ops::Range;
-
 use super::Check;
+use super::conditions::Comparison;
 use super::layout::Layout;
 use crate::command::{
-    Arg, ArgChoice, ArgValues, Command, Condition, Evidence, Proof, ProofStep, Test, Write, WriteValue,
+    Arg, ArgChoice, ArgValues, Command, Evidence, Hold, Proof, ProofStep, Step, Write, WriteValue,
 };
-use crate::file::{ArgFile, At, CommandFile, ConditionFile, ProofFile, WriteFile};
+use crate::file::{ArgFile, At, CommandFile, HoldFile, ProofFile, StepFile, WriteFile};
+use crate::joined::{Joined, JoinedParts};
 use crate::profile::Wire;
-use crate::terms::DataType;
+use crate::terms::ArgKind;
 
 /// What function 5 can write.
 const COIL_VALUES: [u16; 2] = [0xFF00, 0x0000];
 
-/// The parts of a condition, which a proof step spells alike.
-struct Comparison<'a> {
-    span: &'a Range<usize>,
-    point: &'a At<String>,
-    bit: Option<&'a At<u16>>,
-    equals: Option<u32>,
-    not_equals: Option<u32>,
-    between: Option<&'a At<(u32, u32)>>,
-    equals_arg: Option<&'a At<String>>,
-    changes: Option<&'a At<bool>>,
+/// What the parts of a command may refer to.
+pub(super) struct Scope<'s> {
+    pub(super) layout: &'s Layout,
+    pub(super) joined: &'s [Joined],
+    pub(super) wire: Option<&'s Wire>,
+    pub(super) args: &'s [Arg],
 }
 
 impl<'a> Check<'a> {
     /// Every command.
-    pub(super) fn commands(&mut self, layout: &Layout, wire: Option<&Wire>) -> Vec<Command> {
+    pub(super) fn commands(
+        &mut self,
+        layout: &Layout,
+        joined: &[Joined],
+        wire: Option<&Wire>,
+    ) -> Vec<Command> {
         let file = self.file;
         let mut commands: Vec<Command> = Vec::with_capacity(file.commands.len());
         for command in &file.commands {
@@ -45,17 +46,19 @@ impl<'a> Check<'a> {
                     "give each command an id of its own",
                 );
             }
-            commands.extend(self.command(command, layout, wire));
+            let args = self.args(&command.args);
+            let scope = Scope { layout, joined, wire, args: &args };
+            commands.extend(self.command(command, &scope));
         }
         commands
     }
 
-    fn command(&mut self, file: &At<CommandFile>, layout: &Layout, wire: Option<&Wire>) -> Option<Command> {
-        let args = self.args(&file.args);
-        let require = self.conditions(&file.require, &args, layout);
-        let already = self.conditions(&file.already, &args, layout);
-        let write = self.write(&file.write, &args, layout, wire);
-        let proof = self.proof(file, &args, layout);
+    fn command(&mut self, file: &At<CommandFile>, scope: &Scope<'_>) -> Option<Command> {
+        let require = self.conditions(&file.require, scope);
+        let already = self.conditions(&file.already, scope);
+        let hold = file.hold.as_ref().map(|hold| self.hold(hold, scope));
+        let steps = self.steps(file, scope);
+        let proof = self.proof(file, scope);
         Some(Command {
             id: file.id.clone(),
             name: file.name.clone(),
@@ -63,12 +66,63 @@ impl<'a> Check<'a> {
             role: file.role,
             confirm: file.confirm,
             page: file.page,
-            args,
+            args: scope.args.to_vec(),
             require,
             already,
-            write: write?,
+            hold,
+            steps: steps?,
             proof: proof?,
         })
+    }
+
+    fn steps(&mut self, file: &At<CommandFile>, scope: &Scope<'_>) -> Option<Vec<Step>> {
+        match (&file.write, &file.steps) {
+            (Some(write), None) => {
+                let write = self.write(write, scope)?;
+                let (require, already, proof) = (Vec::new(), Vec::new(), Vec::new());
+                Some(vec![Step { require, already, hold: None, write, proof }])
+            }
+            (None, Some(steps)) if !steps.is_empty() => {
+                if let (Some(_), Some(own)) = (&file.hold, &steps[0].hold) {
+                    self.note(
+                        &own.span,
+                        "two holds before the first write",
+                        "keep the hold of the command or the hold of its first step",
+                    );
+                }
+                let steps: Vec<_> = steps.iter().map(|step| self.step(step, scope)).collect();
+                steps.into_iter().collect()
+            }
+            _ => {
+                self.note(
+                    &file.id.span,
+                    format!("`{}` has nothing to send, or says so twice", *file.id),
+                    "write either write, or steps with at least one step",
+                );
+                None
+            }
+        }
+    }
+
+    fn step(&mut self, file: &At<StepFile>, scope: &Scope<'_>) -> Option<Step> {
+        let require = self.conditions(&file.require, scope);
+        let already = self.conditions(&file.already, scope);
+        let hold = file.hold.as_ref().map(|hold| self.hold(hold, scope));
+        let write = self.write(&file.write, scope);
+        let proof: Vec<_> = file.proof.iter().map(|step| self.proof_step(step, scope)).collect();
+        Some(Step { require, already, hold, write: write?, proof: proof.into_iter().collect::<Option<_>>()? })
+    }
+
+    fn hold(&mut self, file: &At<HoldFile>, scope: &Scope<'_>) -> Hold {
+        if *file.within_s == 0 {
+            self.note(&file.within_s.span, "a hold within no time", "write how long it may take");
+        }
+        let (files, any) = if file.any.is_empty() { (&file.all, false) } else { (&file.any, true) };
+        if file.all.is_empty() == file.any.is_empty() {
+            self.note(&file.span, "a hold waits for all of a list or for any", "write one of all and any");
+        }
+        let conditions = self.hold_conditions(files, scope);
+        Hold { conditions, any, within_s: *file.within_s }
     }
 
     fn args(&mut self, files: &[At<ArgFile>]) -> Vec<Arg> {
@@ -82,14 +136,18 @@ impl<'a> Check<'a> {
                     "give each argument a name of its own",
                 );
             }
-            let values = match (&file.choices, file.min, file.max) {
-                (Some(choices), None, None) => self.arg_choices(choices),
-                (None, Some(min), Some(max)) if min <= max => ArgValues::Range(min..=max),
+            let values = match (&file.choices, file.min, file.max, &file.kind) {
+                (Some(choices), None, None, None) => self.arg_choices(choices),
+                (None, Some(min), Some(max), None) if min <= max => ArgValues::Range(min..=max),
+                (None, None, None, Some(kind)) if **kind == ArgKind::Time => {
+                    args.push(self.time(file));
+                    continue;
+                }
                 _ => {
                     self.note(
                         &file.span,
-                        format!("nothing says what `{}` can be", *file.name),
-                        "write either choices, or min and max",
+                        format!("nothing says what `{}` can be, or two things do", *file.name),
+                        "write choices, or min and max, or kind",
                     );
                     ArgValues::Range(0..=u16::MAX)
                 }
@@ -108,6 +166,18 @@ impl<'a> Check<'a> {
             args.push(arg);
         }
         args
+    }
+
+    fn time(&mut self, file: &At<ArgFile>) -> Arg {
+        let now = file.default.as_ref().is_some_and(|default| default.as_str() == "now");
+        if let Some(default) = file.default.as_ref().filter(|_| !now) {
+            self.note(
+                &default.span,
+                format!("`{}` cannot be `{}`", *file.name, **default),
+                "write default = \"now\", or leave it out",
+            );
+        }
+        Arg { name: file.name.clone(), values: ArgValues::Time { now }, default: None }
     }
 
     fn arg_choices(&mut self, files: &At<Vec<At<crate::file::ArgChoiceFile>>>) -> ArgValues {
@@ -129,15 +199,9 @@ impl<'a> Check<'a> {
         ArgValues::Choices(choices)
     }
 
-    fn write(
-        &mut self,
-        file: &At<WriteFile>,
-        args: &[Arg],
-        layout: &Layout,
-        wire: Option<&Wire>,
-    ) -> Option<Write> {
+    fn write(&mut self, file: &At<WriteFile>, scope: &Scope<'_>) -> Option<Write> {
         let function = *file.function;
-        let known = wire.is_none_or(|wire| wire.functions.contains(&function));
+        let known = scope.wire.is_none_or(|wire| wire.functions.contains(&function));
         if !matches!(function, 5 | 6 | 16) || !known {
             self.note(
                 &file.function.span,
@@ -147,13 +211,13 @@ impl<'a> Check<'a> {
             return None;
         }
         let arg = match &file.arg {
-            Some(name) => Some(self.arg_named(name, args)?),
+            Some(name) => Some(self.arg_number(name, scope.args)?),
             None => None,
         };
         let value = match (&file.value, &file.value_by) {
             (Some(value), None) => WriteValue::Fixed(**value),
             (None, Some(by)) => WriteValue::By {
-                point: self.readable_point(&by.point, layout)?,
+                point: self.readable_point(&by.point, scope.layout)?,
                 values: by.values.iter().map(|when| (when.when, when.value)).collect(),
             },
             (None, None) if arg.is_some() => WriteValue::Fixed(0),
@@ -167,14 +231,14 @@ impl<'a> Check<'a> {
             }
         };
         if function == 5 {
-            self.coil_write(file, layout);
+            self.coil_write(file);
         } else {
-            self.register_write(file, layout);
+            self.register_write(file, scope.layout);
         }
         Some(Write { function, address: *file.address, value, arg })
     }
 
-    fn coil_write(&mut self, file: &At<WriteFile>, _: &Layout) {
+    fn coil_write(&mut self, file: &At<WriteFile>) {
         if !self.file.coils.iter().any(|coil| coil.at == *file.address) {
             self.note(
                 &file.address.span,
@@ -207,10 +271,10 @@ impl<'a> Check<'a> {
         }
     }
 
-    fn proof(&mut self, file: &At<CommandFile>, args: &[Arg], layout: &Layout) -> Option<Proof> {
+    fn proof(&mut self, file: &At<CommandFile>, scope: &Scope<'_>) -> Option<Proof> {
         match (&file.proof, &file.no_proof) {
             (Some(steps), None) if !steps.is_empty() => {
-                let steps: Vec<_> = steps.iter().map(|step| self.proof_step(step, args, layout)).collect();
+                let steps: Vec<_> = steps.iter().map(|step| self.proof_step(step, scope)).collect();
                 Some(Proof::Steps(steps.into_iter().collect::<Option<_>>()?))
             }
             (None, Some(reason)) => {
@@ -228,31 +292,24 @@ impl<'a> Check<'a> {
         }
     }
 
-    fn proof_step(&mut self, file: &At<ProofFile>, args: &[Arg], layout: &Layout) -> Option<ProofStep> {
+    fn proof_step(&mut self, file: &At<ProofFile>, scope: &Scope<'_>) -> Option<ProofStep> {
         if *file.within_s == 0 {
             self.note(&file.within_s.span, "a proof within no time", "write how long it may take");
         }
-        let what = match (&file.point, file.device) {
-            (Some(point), None) => Evidence::Point(self.condition(
-                &Comparison {
-                    span: &file.span,
-                    point,
-                    bit: file.bit.as_ref(),
-                    equals: file.equals,
-                    not_equals: file.not_equals,
-                    between: file.between.as_ref(),
-                    equals_arg: file.equals_arg.as_ref(),
-                    changes: file.changes.as_ref(),
-                },
-                args,
-                layout,
-            )?),
-            (None, Some(device)) if !compares(file) => Evidence::Device(device),
+        if let Some(tolerance) = file.tolerance_s.as_ref().filter(|_| file.joined.is_none()) {
+            self.note(&tolerance.span, "tolerance_s means nothing here", "remove it, or write joined");
+        }
+        let what = match (&file.point, file.device, &file.joined) {
+            (Some(_), None, None) => Evidence::Point(self.condition(&Comparison::of_proof(file), scope)?),
+            (None, Some(device), None) if !compares(file) && file.equals_arg.is_none() => {
+                Evidence::Device(device)
+            }
+            (None, None, Some(joined)) if !compares(file) => self.clock_proof(file, joined, scope)?,
             _ => {
                 self.note(
                     &file.span,
-                    "a proof step looks at a point or at the device",
-                    "write point with one comparison, or device alone",
+                    "a proof step looks at a point, at the device or at a joined clock",
+                    "write point with one comparison, device alone, or joined with equals_arg",
                 );
                 return None;
             }
@@ -260,123 +317,45 @@ impl<'a> Check<'a> {
         Some(ProofStep { what, within_s: *file.within_s })
     }
 
-    fn conditions(&mut self, files: &[At<ConditionFile>], args: &[Arg], layout: &Layout) -> Vec<Condition> {
-        let mut conditions = Vec::with_capacity(files.len());
-        for file in files {
-            conditions.extend(self.condition(
-                &Comparison {
-                    span: &file.span,
-                    point: &file.point,
-                    bit: file.bit.as_ref(),
-                    equals: file.equals,
-                    not_equals: file.not_equals,
-                    between: file.between.as_ref(),
-                    equals_arg: file.equals_arg.as_ref(),
-                    changes: None,
-                },
-                args,
-                layout,
-            ));
-        }
-        conditions
-    }
-
-    fn condition(&mut self, file: &Comparison<'_>, args: &[Arg], layout: &Layout) -> Option<Condition> {
-        let point = self.readable_point(file.point, layout)?;
-        let limit = self.compared(file, point, layout)?;
-        let mut tests = Vec::new();
-        tests.extend(file.equals.map(Test::Equals));
-        tests.extend(file.not_equals.map(Test::NotEquals));
-        tests.extend(file.between.map(|range| Test::Between(range.0..=range.1)));
-        if let Some(name) = file.equals_arg {
-            tests.push(Test::EqualsArg(self.arg_named(name, args)?));
-        }
-        if file.changes.is_some_and(|changes| **changes) {
-            tests.push(Test::Changes);
-        }
-        let (Some(test), true) = (tests.pop(), tests.is_empty()) else {
+    fn clock_proof(
+        &mut self,
+        file: &At<ProofFile>,
+        name: &At<String>,
+        scope: &Scope<'_>,
+    ) -> Option<Evidence> {
+        let is_clock = |joined: &Joined| matches!(joined.parts, JoinedParts::Clock { .. });
+        let joined = scope.joined.iter().position(|joined| joined.signal == **name && is_clock(joined));
+        let Some(joined) = joined else {
             self.note(
-                file.span,
-                format!("`{}` is compared with nothing, or with two things", **file.point),
-                "write one comparison: equals, not_equals, between, equals_arg, or in a proof changes = true",
+                &name.span,
+                format!("`{}` is no joined clock", **name),
+                "name the signal of a [[joined]] with year to second",
             );
             return None;
         };
-        let fits = match &test {
-            Test::Equals(code) | Test::NotEquals(code) => *code <= limit,
-            Test::Between(range) => !range.is_empty() && *range.end() <= limit,
-            Test::EqualsArg(_) | Test::Changes => true,
-        };
-        if !fits {
+        let time = |name: &At<String>| scope.args.iter().position(|arg| is_time(arg) && arg.name == **name);
+        let (Some(arg), Some(tolerance_s)) = (file.equals_arg.as_ref().and_then(time), &file.tolerance_s)
+        else {
             self.note(
-                file.span,
-                format!("`{}` can never be compared so", **file.point),
-                format!("write raw codes from 0 to {limit}"),
+                &file.span,
+                "the clock is compared with no time",
+                "write equals_arg = the name of an argument of kind time, and tolerance_s",
             );
-        }
-        Some(Condition { point, bit: file.bit.map(|bit| **bit), test })
-    }
-
-    /// The greatest raw code that a comparison can meet; notes what cannot be compared.
-    fn compared(&mut self, file: &Comparison<'_>, point: usize, layout: &Layout) -> Option<u32> {
-        let target = &layout.points[point];
-        match (target.data_type, file.bit) {
-            (DataType::Bits, Some(bit)) => {
-                if target.bit(**bit).is_none() {
-                    self.note(
-                        &bit.span,
-                        format!("`{}` has no named bit {}", target.id, **bit),
-                        "write the number of a bit of its list",
-                    );
-                    return None;
-                }
-                Some(1)
-            }
-            (DataType::Bits, None) => {
-                self.note(
-                    &file.point.span,
-                    format!("`{}` is a set of bits", target.id),
-                    "add bit = its number",
-                );
-                None
-            }
-            (kind, None) if kind.is_numeric() || kind == DataType::Choice => {
-                Some(if target.registers == 2 { u32::MAX } else { 0xFFFF })
-            }
-            (kind, _) => {
-                self.note(
-                    file.span,
-                    format!("a point of type {kind} cannot be compared so"),
-                    "name a number, a choice, or one bit of a set",
-                );
-                None
-            }
-        }
-    }
-
-    fn readable_point(&mut self, name: &At<String>, layout: &Layout) -> Option<usize> {
-        let point = self.point_named(name, layout)?;
-        if !layout.points[point].access.is_readable() {
-            self.note(&name.span, format!("`{}` cannot be read", **name), "name a point that can");
             return None;
-        }
-        Some(point)
-    }
-
-    fn arg_named(&mut self, name: &At<String>, args: &[Arg]) -> Option<usize> {
-        let index = args.iter().position(|arg| arg.name == **name);
-        if index.is_none() {
-            self.note(&name.span, format!("the command has no argument `{}`", **name), "name one of `args`");
-        }
-        index
+        };
+        Some(Evidence::Clock { joined, arg, tolerance_s: **tolerance_s })
     }
 }
 
+fn is_time(arg: &Arg) -> bool {
+    matches!(arg.values, ArgValues::Time { .. })
+}
+
+/// Compares a point with something other than an argument.
 fn compares(file: &ProofFile) -> bool {
     file.bit.is_some()
         || file.equals.is_some()
         || file.not_equals.is_some()
         || file.between.is_some()
-        || file.equals_arg.is_some()
         || file.changes.is_some()
 }

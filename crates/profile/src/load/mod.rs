@@ -1,6 +1,8 @@
 //! From text to a checked profile or vocabulary.
 
 mod commands;
+mod conditions;
+mod joined;
 mod layout;
 mod lint;
 mod lists;
@@ -12,7 +14,9 @@ mod wire;
 
 use std::ops::Range;
 
-use crate::file::{At, BitFile, ChoiceFile, CoilFile, CommandFile, GroupFile, PointFile, ProfileFile};
+use crate::file::{
+    At, BitFile, ChoiceFile, CoilFile, CommandFile, GroupFile, JoinedFile, PointFile, ProfileFile,
+};
 use crate::findings::{Collector, Findings};
 use crate::profile::{Coil, Identity, IdentityModel, Manual, Profile};
 use crate::suggest::nearest;
@@ -30,6 +34,7 @@ const PRUNES: &[shape::Prune] = &[
     |table, collector| shape::prune::<BitFile>(table, &["bits", "*", "bits"], collector),
     |table, collector| shape::prune::<PointFile>(table, &["groups", "*", "points"], collector),
     |table, collector| shape::prune::<GroupFile>(table, &["groups"], collector),
+    |table, collector| shape::prune::<JoinedFile>(table, &["joined"], collector),
     |table, collector| shape::prune::<CoilFile>(table, &["coils"], collector),
     |table, collector| shape::prune::<CommandFile>(table, &["commands"], collector),
 ];
@@ -47,7 +52,8 @@ pub(crate) fn parse(file_name: &str, text: &str, vocabulary: &Vocabulary) -> Res
     let layout = check.points(wire.as_ref());
     let identity = check.identity(&layout);
     let coils = check.coils();
-    let commands = check.commands(&layout, wire.as_ref());
+    let joined = check.joined(&layout);
+    let commands = check.commands(&layout, &joined, wire.as_ref());
     let Check { collector, .. } = check;
     let (Some(wire), true) = (wire, collector.is_empty()) else {
         return Err(collector.into_findings());
@@ -66,6 +72,7 @@ pub(crate) fn parse(file_name: &str, text: &str, vocabulary: &Vocabulary) -> Res
         coils,
         commands,
         by_id: by_id.into_iter().filter_map(|(id, index)| Some((id, index?))).collect(),
+        joined,
     })
 }
 

@@ -1,10 +1,20 @@
-//! Remote commands as data: what must hold, the one write, and what proves its effect.
+//! Remote commands as data: what must hold, the writes, each sent once, and what proves their effect.
+
+mod arguments;
+mod report;
+mod run;
+mod sight;
+mod words;
 
 use std::ops::RangeInclusive;
 
-use crate::terms::{Confirm, DeviceProof, Risk, Role};
+use crate::terms::{Confirm, DeviceProof, Risk, Role, TimePart};
 
-/// A remote command.
+pub use arguments::{ArgError, ArgValue, Arguments};
+pub use report::{Observed, ObservedShow, Report, Seen, SeenShow, Sign, Verdict};
+pub use run::{Frame, Next, ReadFailure, Run, WriteOutcome};
+
+/// A remote command: one write, or a procedure of several.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Command {
@@ -26,9 +36,11 @@ pub struct Command {
     pub require: Vec<Condition>,
     /// If it is not empty and all of it holds, the state is there already and nothing is sent.
     pub already: Vec<Condition>,
-    /// The write, sent once.
-    pub write: Write,
-    /// How its effect shows.
+    /// What is waited for before the first write.
+    pub hold: Option<Hold>,
+    /// The writes in their order, each sent once; never empty.
+    pub steps: Vec<Step>,
+    /// How its effect shows, after the last write.
     pub proof: Proof,
 }
 
@@ -37,6 +49,39 @@ impl Command {
     pub fn arg(&self, name: &str) -> Option<&Arg> {
         self.args.iter().find(|arg| arg.name == name)
     }
+
+    /// Whether it is several writes with what lies between them.
+    pub fn is_procedure(&self) -> bool {
+        self.steps.len() > 1
+    }
+}
+
+/// One write of a command, and what belongs to it alone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Step {
+    /// What must hold, also while it is waited for `hold`; otherwise the command ends here.
+    pub require: Vec<Condition>,
+    /// If it is not empty and all of it holds, the step is left out.
+    pub already: Vec<Condition>,
+    /// What is waited for before the write.
+    pub hold: Option<Hold>,
+    /// The write, sent once.
+    pub write: Write,
+    /// What must show before the next step.
+    pub proof: Vec<ProofStep>,
+}
+
+/// What is waited for before a write.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Hold {
+    /// All of these at once, or one of them.
+    pub conditions: Vec<Condition>,
+    /// Whether one of them is enough.
+    pub any: bool,
+    /// How long it may take, in seconds; the write is not sent if it takes longer.
+    pub within_s: u16,
 }
 
 /// An argument of a command.
@@ -47,12 +92,12 @@ pub struct Arg {
     pub name: String,
     /// What it can be.
     pub values: ArgValues,
-    /// Its number when it is not given; it must be given where this is none.
+    /// Its number when it is not given; it must be given where this is none. For a time see [`ArgValues::Time`].
     pub default: Option<u16>,
 }
 
 impl Arg {
-    /// The number behind a text: an id of the choices, or a decimal number in the range.
+    /// The number behind a text: an id of the choices, or a decimal number in the range; none for a time.
     pub fn parse(&self, text: &str) -> Option<u16> {
         match &self.values {
             ArgValues::Choices(choices) => {
@@ -60,6 +105,7 @@ impl Arg {
                 Some(choice.value)
             }
             ArgValues::Range(range) => text.parse().ok().filter(|value| range.contains(value)),
+            ArgValues::Time { .. } => None,
         }
     }
 }
@@ -71,6 +117,11 @@ pub enum ArgValues {
     Choices(Vec<ArgChoice>),
     /// A number in this range.
     Range(RangeInclusive<u16>),
+    /// A local date and time, or `now`; it runs on while the command does.
+    Time {
+        /// Whether it is now when it is not given.
+        now: bool,
+    },
 }
 
 /// One choice of an argument.
@@ -83,7 +134,17 @@ pub struct ArgChoice {
     pub value: u16,
 }
 
-/// The write of a command.
+/// A number that an argument gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ArgRef {
+    /// Index of the argument.
+    pub arg: usize,
+    /// The part of a time; none for choices and numbers.
+    pub part: Option<TimePart>,
+}
+
+/// The write of a step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Write {
@@ -93,8 +154,8 @@ pub struct Write {
     pub address: u16,
     /// The value, before the argument is put to it.
     pub value: WriteValue,
-    /// Index of the argument whose number is OR-ed onto the value.
-    pub arg: Option<usize>,
+    /// The argument whose number is OR-ed onto the value.
+    pub arg: Option<ArgRef>,
 }
 
 /// The value of a write.
@@ -125,16 +186,28 @@ impl WriteValue {
     }
 }
 
-/// A comparison of one point, or one bit of it.
+/// A comparison.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Condition {
-    /// Index of the point.
-    pub point: usize,
-    /// The bit, where the point is a set of them; then 0 and 1 are compared.
-    pub bit: Option<u16>,
-    /// The comparison.
+    /// What is compared.
+    pub subject: Subject,
+    /// With what.
     pub test: Test,
+}
+
+/// What a condition compares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Subject {
+    /// A point, or one bit of it.
+    Point {
+        /// Index of the point.
+        point: usize,
+        /// The bit, where the point is a set of them; then 0 and 1 are compared.
+        bit: Option<u16>,
+    },
+    /// An argument, so that a moment can be waited for; only in a hold.
+    Arg(ArgRef),
 }
 
 /// A comparison with a raw code: the number before scale, the code of a choice, or a bit.
@@ -146,8 +219,8 @@ pub enum Test {
     NotEquals(u32),
     /// Lies in this range.
     Between(RangeInclusive<u32>),
-    /// Is the number of the argument of this index.
-    EqualsArg(usize),
+    /// Is the number of an argument.
+    EqualsArg(ArgRef),
     /// Differs from what it was before the write; only in proofs.
     Changes,
 }
@@ -162,6 +235,16 @@ pub enum Proof {
         /// Why nothing shows it, as a sentence.
         reason: String,
     },
+}
+
+impl Proof {
+    /// The steps; empty where nothing is documented.
+    pub fn steps(&self) -> &[ProofStep] {
+        match self {
+            Self::Steps(steps) => steps,
+            Self::None { .. } => &[],
+        }
+    }
 }
 
 /// One step of a proof.
@@ -179,6 +262,15 @@ pub struct ProofStep {
 pub enum Evidence {
     /// A point.
     Point(Condition),
+    /// A joined clock, against the time of an argument as it runs.
+    Clock {
+        /// Index among the joined signals.
+        joined: usize,
+        /// Index of the argument.
+        arg: usize,
+        /// How far apart they may be, in seconds.
+        tolerance_s: u16,
+    },
     /// The device as a whole.
     Device(DeviceProof),
 }
