@@ -2,4 +2,4 @@
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| busbar_fuzz::client(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| busbar_fuzz::frames::client(bytes));

@@ -2,4 +2,4 @@
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| busbar_fuzz::rtu_stream(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| busbar_fuzz::frames::rtu_stream(bytes));

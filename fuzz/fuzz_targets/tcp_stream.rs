@@ -2,4 +2,4 @@
 
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| busbar_fuzz::tcp_stream(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| busbar_fuzz::frames::tcp_stream(bytes));

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-#[path = "../../../fuzz/src/lib.rs"]
+#[path = "../../../fuzz/src/frames.rs"]
 mod fuzz;
 
 type Target = (&'static str, fn(&[u8]));
@@ -16,12 +16,15 @@ const TARGETS: [Target; 5] = [
     ("listener", fuzz::listener),
 ];
 
+/// Replayed by the tests of `busbar-profile`.
+const ELSEWHERE: [&str; 2] = ["profile_text", "register_image"];
+
 #[test]
 fn every_file_of_every_target() {
     let corpus = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus");
     let mut folders: Vec<_> =
         fs::read_dir(&corpus).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-    let mut names: Vec<_> = TARGETS.iter().map(|(name, _)| *name).collect();
+    let mut names: Vec<_> = TARGETS.iter().map(|(name, _)| *name).chain(ELSEWHERE).collect();
     folders.sort();
     names.sort_unstable();
     assert_eq!(folders, names, "a folder of the corpus for each target");

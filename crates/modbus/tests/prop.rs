@@ -7,7 +7,7 @@ use busbar_modbus::{Bits, Client, ExceptionCode, Framing, Progress, Request, Res
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-#[path = "../../../fuzz/src/lib.rs"]
+#[path = "../../../fuzz/src/frames.rs"]
 mod fuzz;
 
 /// A PDU with what it borrows.

@@ -160,10 +160,11 @@ fn tcp_what_comes_while_nobody_asked_is_late() {
 
 #[test]
 fn tcp_wrong_answers_are_dropped_and_the_right_one_awaited() {
-    let cases: [(&str, Request<'_>, &str, Counters); 11] = [
+    let cases: [(&str, Request<'_>, &str, Counters); 12] = [
         ("unit", READ, "0001 0000 0007 02 03 04 FFFF FFFF", counted(|c| c.wrong_unit = 1)),
         ("function", READ, "0001 0000 0007 01 04 04 FFFF FFFF", counted(|c| c.wrong_function = 1)),
         ("exception to a function", READ, "0001 0000 0003 01 84 02", counted(|c| c.wrong_function = 1)),
+        ("too little", READ, "0001 0000 0005 01 03 02 FFFF", counted(|c| c.wrong_length = 1)),
         ("too much", READ, "0001 0000 0009 01 03 06 FFFF FFFF FFFF", counted(|c| c.wrong_length = 1)),
         ("nothing", READ, "0001 0000 0003 01 03 00", counted(|c| c.wrong_length = 1)),
         ("half a register", READ, "0001 0000 0006 01 03 03 FFFF FF", counted(|c| c.wrong_length = 1)),
@@ -191,15 +192,44 @@ fn tcp_wrong_answers_are_dropped_and_the_right_one_awaited() {
 }
 
 #[test]
-fn tcp_a_short_read_is_an_answer() {
-    run(
-        Framing::Tcp,
-        &[
-            Ask(0, READ, "0001 0000 0006 01 03 0020 0002"),
-            Come(1, "0001 0000 0005 01 03 02 0007", Answered),
-            registers(&[7]),
-        ],
-    );
+fn a_short_read_is_an_answer_only_where_that_is_allowed() {
+    let cases = [
+        (Framing::Tcp, "0001 0000 0005 01 03 02 0007", "0002 0000 0005 01 03 02 0007"),
+        (Framing::Rtu, "01 03 02 0007 F986", "01 03 02 0007 F986"),
+    ];
+    for (framing, first, second) in cases {
+        let mut client = Client::new(framing);
+        let ask = |client: &mut Client, at, request| {
+            assert_eq!(client.start(ms(at), 1, request, ms(1000), &mut Vec::new()), Ok(()), "{framing:?}");
+        };
+        ask(&mut client, 0, &READ);
+        assert_eq!(client.receive(ms(1), &hex(first)), Pending, "{framing:?}");
+        assert_eq!(client.response(), None, "{framing:?}");
+        assert_eq!(*client.counters(), counted(|c| c.wrong_length = 1), "{framing:?}");
+        assert_eq!(client.expire(ms(1000)), TimedOut, "{framing:?}");
+
+        ask(&mut client, 2000, &READ);
+        client.accept_short();
+        assert_eq!(client.receive(ms(2001), &hex(second)), Answered, "{framing:?}");
+        assert_eq!(client.response(), Some(Response::ReadHoldingRegisters((&[7]).into())), "{framing:?}");
+
+        // It holds for one transaction.
+        ask(&mut client, 3000, &READ);
+        let third = second.replacen("0002", "0003", 1);
+        assert_eq!(client.receive(ms(3001), &hex(&third)), Pending, "{framing:?}");
+        assert_eq!(*client.counters(), counted(|c| c.wrong_length = 2), "{framing:?}");
+    }
+}
+
+#[test]
+fn no_length_but_a_shorter_one_is_ever_allowed() {
+    for wrong in ["0001 0000 0003 01 03 00", "0001 0000 0009 01 03 06 FFFF FFFF FFFF"] {
+        let mut client = Client::new(Framing::Tcp);
+        assert_eq!(client.start(ms(0), 1, &READ, ms(1000), &mut Vec::new()), Ok(()));
+        client.accept_short();
+        assert_eq!(client.receive(ms(1), &hex(wrong)), Pending, "{wrong}");
+        assert_eq!(*client.counters(), counted(|c| c.wrong_length = 1), "{wrong}");
+    }
 }
 
 #[test]
@@ -243,8 +273,8 @@ fn tcp_an_answer_before_the_break_counts() {
         Framing::Tcp,
         &[
             Ask(0, READ, "0001 0000 0006 01 03 0020 0002"),
-            Come(1, "0001 0000 0005 01 03 02 0007 0000 0000 0000 00", Answered),
-            registers(&[7]),
+            Come(1, "0001 0000 0007 01 03 04 0007 0008 0000 0000 0000 00", Answered),
+            registers(&[7, 8]),
         ],
     );
     assert_eq!(client.fault(), Some(Fault::Length { found: 0 }));
