@@ -3,6 +3,7 @@
 //! Absolute figures vary from run to run and from machine to machine: compare ratios only.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its table")]
 
+mod decode;
 mod peers;
 mod process;
 mod wire;
@@ -10,13 +11,17 @@ mod wire;
 use std::process::ExitCode;
 
 const USAGE: &str = "\
-usage: busbar-bench wire [--rounds N] [--seconds S]
-  wire    processor time a request of client and server, beside a bare C program and tokio-modbus";
+usage: busbar-bench [decode | wire [--rounds N] [--seconds S]]
+  decode  nanoseconds to decode and encode a point through a profile, and to plan reads
+  wire    processor time a request of client and server, beside a bare C program and tokio-modbus
+Without a word it runs both.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match arguments.as_slice() {
+        [] => decode::run().and_then(|()| wire::run(&[])),
+        ["decode"] => decode::run(),
         ["wire", options @ ..] => wire::run(options),
         // How the bench starts its peers: each is a process of its own, so that its processor time is its own.
         ["peer", role @ ..] => peers::run(role),
