@@ -68,12 +68,28 @@ pub enum LinkError {
     /// The protocol has no frame for this request, for example because of its count; nothing was sent.
     #[error("not sent: {0}")]
     NotSent(#[from] StartError),
-    /// The wire's task has ended; nothing was sent.
+    /// The wire's task has ended; a write that ends so was not sent.
     #[error("this wire has been closed")]
     Closed,
 }
 
 impl LinkError {
+    /// Whether a write that ended so may have taken effect, or may still do: then find out by reading, and never send it
+    /// again. After any other error it has not.
+    ///
+    /// Exceptions are judged by what the standard says of them (V1.1b3, 7); a code that it does not have may mean
+    /// anything, except 10, which some makers use for write protection.
+    pub fn may_have_taken_effect(&self) -> bool {
+        match self {
+            Self::Lost { .. } => true,
+            Self::Exception { function, code, .. } => {
+                let is_read = matches!(function, 0x01..=0x04);
+                !is_read && !matches!(code.0, 1 | 2 | 3 | 6 | 10)
+            }
+            _ => false,
+        }
+    }
+
     /// Whose fault it is, for a first guess at where to look.
     pub fn fault(&self) -> Fault {
         match self {
@@ -118,6 +134,9 @@ pub enum Loss {
     /// The connection dropped first.
     #[error("{0}")]
     Dropped(Outage),
+    /// The wire was closed first, as when the program ends.
+    #[error("the wire was closed")]
+    Closed,
 }
 
 /// Why an endpoint cannot be opened at all.
@@ -127,6 +146,12 @@ pub enum OpenError {
     /// This version reads such endpoints but has no transport for them.
     #[error("{endpoint}: this version does not speak {} yet, use a tcp:// endpoint", endpoint.scheme())]
     NotSpoken {
+        /// The endpoint asked for.
+        endpoint: Endpoint,
+    },
+    /// Port 0 lets the system choose where to listen; there is no connecting to it.
+    #[error("{endpoint}: a device has no port 0; write the port that it listens on, 502 for most")]
+    NoPort {
         /// The endpoint asked for.
         endpoint: Endpoint,
     },
@@ -263,6 +288,27 @@ mod tests {
         ] {
             assert_eq!(error.to_string(), sentence);
             assert_eq!(error.fault(), fault, "{sentence}");
+        }
+    }
+
+    #[test]
+    fn tells_which_writes_may_have_taken_effect() {
+        let exception =
+            |function, code| LinkError::Exception { unit: 1, function, code: ExceptionCode(code) };
+        for code in 0..=255 {
+            let nothing_done = [1, 2, 3, 6, 10].contains(&code);
+            assert_eq!(exception(6, code).may_have_taken_effect(), !nothing_done, "exception {code}");
+            assert!(!exception(3, code).may_have_taken_effect(), "a read changes nothing");
+        }
+        let lost = LinkError::Lost { unit: 1, loss: Loss::TimedOut { after: Duration::from_secs(1) } };
+        assert!(lost.may_have_taken_effect());
+        for error in [
+            LinkError::Down { reason: outage(Cause::Refused) },
+            LinkError::QueueFull { waiting: 64 },
+            LinkError::NotSent(StartError::Busy),
+            LinkError::Closed,
+        ] {
+            assert!(!error.may_have_taken_effect(), "{error}");
         }
     }
 

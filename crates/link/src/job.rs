@@ -65,6 +65,8 @@ pub(crate) struct Job {
     pub(crate) priority: Priority,
     /// How long each try waits for its answer.
     pub(crate) timeout: Duration,
+    /// Whether fewer registers than asked for are an answer.
+    pub(crate) short: bool,
     /// Where the registers of a read go: the caller's own buffer, so that nothing is allocated.
     pub(crate) registers: Vec<u16>,
 }

@@ -8,6 +8,8 @@
 //!   that ([`LinkError::Lost`]) and finds out by reading.
 //! - **A dead connection holds nobody up.** While a wire is down requests fail at once with the reason; while it is
 //!   being connected they wait as long as they would wait for an answer.
+//! - **A silent unit holds nobody up either.** It is polled again behind everybody else, and the connection is not
+//!   blamed for it while others on the wire answer.
 //! - **Commands go first**, then what a person waits for, then polling ([`Priority`]).
 //!
 //! Inside, `wire` holds every rule as a pure state machine that is given the time; `shared` puts it and the connection
@@ -21,6 +23,7 @@ mod options;
 mod port;
 mod queue;
 mod shared;
+mod silence;
 mod statistics;
 mod task;
 mod trace;

@@ -26,17 +26,21 @@ pub struct Link {
     owner: Arc<Owner>,
     priority: Priority,
     timeout: Duration,
+    short: bool,
 }
 
 impl Link {
     /// Opens a wire and starts to connect. Whether it is up is seen from [`Self::state`] or the first request.
     ///
     /// # Errors
-    /// [`OpenError::NotSpoken`] for endpoints other than `tcp://`, [`OpenError::NoRuntime`] outside a tokio runtime.
+    /// [`OpenError::NotSpoken`] for endpoints other than `tcp://`, [`OpenError::NoPort`] for port 0,
+    /// [`OpenError::NoRuntime`] outside a tokio runtime.
     pub fn open(endpoint: Endpoint, options: Options) -> Result<Self, OpenError> {
-        let Endpoint::Tcp { .. } = endpoint else {
-            return Err(OpenError::NotSpoken { endpoint });
-        };
+        match endpoint {
+            Endpoint::Tcp { port: 0, .. } => return Err(OpenError::NoPort { endpoint }),
+            Endpoint::Tcp { .. } => {}
+            _ => return Err(OpenError::NotSpoken { endpoint }),
+        }
         let runtime = Handle::try_current().map_err(|_| OpenError::NoRuntime)?;
 
         let endpoint = Arc::new(endpoint);
@@ -44,7 +48,8 @@ impl Link {
         let shared = Arc::new(Shared::new(wire, options.trace.is_some()));
         let timeout = options.timeout;
         runtime.spawn(Task::new(Arc::clone(&shared), Arc::clone(&endpoint), options));
-        Ok(Self { owner: Arc::new(Owner { shared, endpoint }), priority: Priority::Person, timeout })
+        let owner = Arc::new(Owner { shared, endpoint });
+        Ok(Self { owner, priority: Priority::Person, timeout, short: false })
     }
 
     /// The same wire for requests of another priority. A link starts as [`Priority::Person`].
@@ -59,9 +64,16 @@ impl Link {
         Self { timeout, ..self.clone() }
     }
 
+    /// The same wire for reads that may also be answered by fewer registers than they ask for, where the device is
+    /// known to cut long reads. A link starts without: there a short answer is dropped and counted as a wrong length.
+    #[must_use]
+    pub fn with_short_answers(&self, allowed: bool) -> Self {
+        Self { short: allowed, ..self.clone() }
+    }
+
     /// Reads registers side by side, 1 to 125, with function 3 (holding) or 4 (input).
     ///
-    /// There may be fewer than asked for: some devices cut long reads.
+    /// All that were asked for come, or at least one where [short answers](Self::with_short_answers) are allowed.
     ///
     /// # Errors
     /// Any [`LinkError`] but [`LinkError::Lost`].
@@ -97,6 +109,7 @@ impl Link {
             ask: Ask::read(function, address, count)?,
             priority: self.priority,
             timeout: self.timeout,
+            short: self.short,
             registers: std::mem::take(registers),
         };
         let outcome = self.ask(job).await;
@@ -109,13 +122,20 @@ impl Link {
     /// Dropped before it was sent, it is not sent.
     ///
     /// # Errors
-    /// [`LinkError::Lost`] when it left and no answer came: it may have taken effect. After any other error it has not.
+    /// What is known after each, and [`LinkError::may_have_taken_effect`] says in short:
+    /// - [`LinkError::Lost`]: at least a part of it left, and no answer came. It may have taken effect, or may still.
+    /// - [`LinkError::Exception`]: the device, or a converter in front of it, answered. Codes 1, 2, 3, 6 and 10 say
+    ///   that nothing was done. 4 says that it failed on the way, 5 that it was accepted and goes on, 11 that a
+    ///   converter passed it on and heard nothing. After these, and after codes that the standard does not have, it may
+    ///   have taken effect.
+    /// - [`LinkError::Down`], [`LinkError::QueueFull`], [`LinkError::NotSent`], [`LinkError::Closed`]: nothing left.
     pub async fn write(&self, unit: u8, write: Write) -> Result<(), LinkError> {
         let job = Job {
             unit,
             ask: Ask::Write(write),
             priority: Priority::Command,
             timeout: self.timeout,
+            short: false,
             registers: Vec::new(),
         };
         self.ask(job).await.result

@@ -7,19 +7,22 @@ use crate::trace::Trace;
 /// How a wire behaves. The defaults suit a controller on a local network.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// How long one attempt to connect may take.
+    /// How long an attempt to connect to one address may take. A host name may have several, and each is tried so long;
+    /// to look them up may take as long again.
     pub connect_timeout: Duration,
     /// How long each try of a request waits for its answer.
     pub timeout: Duration,
     /// Least time between the end of one exchange and the next request.
     pub spacing: Duration,
-    /// How often a read is sent again after a time-out or a drop. Writes never are.
+    /// How often a read is sent again after a time-out or a drop. A unit that did not answer last time gets one try
+    /// while others on the wire answer. Writes are never sent again.
     pub retries: u8,
     /// Most requests that may wait in each class of priority.
     pub queue: usize,
-    /// After so many time-outs in a row the connection is taken for dead and made anew.
+    /// After so many time-outs in a row the connection is taken for dead and made anew, unless a unit that may still
+    /// answer was not asked among them.
     pub timeouts_to_drop: u32,
-    /// How long to wait before a connection that failed is tried again.
+    /// How long to wait before a connection that failed is tried again, or one that dropped before it had proved good.
     pub backoff: Backoff,
     /// Sees every frame, both ways.
     pub trace: Option<Trace>,

@@ -6,6 +6,13 @@ use std::time::Duration;
 use crate::error::LinkError;
 use crate::job::{Job, Outcome, Priority};
 
+/// The class behind those of `Priority`: polls of units that did not answer last time, or never were asked.
+const PROBES: usize = Priority::COUNT;
+
+/// A probe that has waited so many of its time-outs goes ahead of a poll, so that a busy wire finds out that a unit is
+/// back.
+const PROBE_PATIENCE: u32 = 10;
+
 /// A caller's claim on one outcome.
 ///
 /// Not `Clone`: it ends with the outcome, or with `cancel`.
@@ -28,20 +35,32 @@ pub(crate) struct Place(usize);
 #[derive(Debug)]
 pub(crate) struct Queue {
     slots: Vec<Slot>,
-    waiting: [List; Priority::COUNT],
+    waiting: [List; Priority::COUNT + 1],
     free: List,
+    /// The last job whose turn came was a probe: now it is somebody else's.
+    probed: bool,
     /// Most jobs that may wait in one priority, so that polling cannot shut out a command.
     capacity: usize,
 }
 
 impl Queue {
     pub(crate) fn new(capacity: usize) -> Self {
-        Self { slots: Vec::new(), waiting: Default::default(), free: List::default(), capacity }
+        Self {
+            slots: Vec::new(),
+            waiting: Default::default(),
+            free: List::default(),
+            probed: false,
+            capacity,
+        }
     }
 
     /// Whether one more job of this priority may wait.
     pub(crate) fn room(&self, priority: Priority) -> Result<(), LinkError> {
-        let waiting = self.waiting[priority.index()].length;
+        let probes = match priority {
+            Priority::Poll => self.waiting[PROBES].length,
+            _ => 0,
+        };
+        let waiting = self.waiting[priority.index()].length + probes;
         match waiting < self.capacity {
             true => Ok(()),
             false => Err(LinkError::QueueFull { waiting }),
@@ -50,7 +69,7 @@ impl Queue {
 
     /// Puts a job behind the others of its priority. Ask for `room` first.
     pub(crate) fn push(&mut self, entry: Entry) -> Ticket {
-        let class = entry.job.priority.index();
+        let class = entry.class();
         let index = match self.free.pop_front(&self.slots) {
             Some(index) => {
                 let slot = &mut self.slots[index];
@@ -72,17 +91,33 @@ impl Queue {
     }
 
     /// The job whose turn it is. It keeps its slot until it is finished or put back.
-    pub(crate) fn pop(&mut self) -> Option<Place> {
+    pub(crate) fn pop(&mut self, now: Duration) -> Option<Place> {
+        let mut order = [0, 1, 2, PROBES];
+        if self.probe_is_due(now) {
+            order.swap(2, PROBES);
+        }
         let Self { slots, waiting, .. } = self;
-        waiting.iter_mut().find_map(|class| class.pop_front(slots)).map(Place)
+        let (class, index) =
+            order.into_iter().find_map(|class| Some((class, waiting[class].pop_front(slots)?)))?;
+        self.probed = class == PROBES;
+        Some(Place(index))
     }
 
-    /// Puts a popped job in front of the others of its priority: its next try.
+    /// Puts a popped job behind the others of its class: its next try.
     pub(crate) fn put_back(&mut self, place: Place) {
         if let Some(entry) = self.entry(place) {
-            let class = entry.job.priority.index();
-            self.waiting[class].push_front(&mut self.slots, place.0);
+            let class = entry.class();
+            self.waiting[class].push_back(&mut self.slots, place.0);
         }
+    }
+
+    /// Whether a probe has waited long enough to go ahead of a poll, once.
+    fn probe_is_due(&self, now: Duration) -> bool {
+        let first = self.waiting[PROBES].first.filter(|_| !self.probed);
+        first.is_some_and(|index| {
+            let Entry { job, since, .. } = &self.slots[index].entry;
+            now.saturating_sub(*since) >= job.timeout.saturating_mul(PROBE_PATIENCE)
+        })
     }
 
     /// A job that is not finished; none when its caller is gone.
@@ -157,7 +192,7 @@ impl Queue {
         slot.entry.waker = None;
         match slot.stage {
             Stage::Pending => {
-                let class = slot.entry.job.priority.index();
+                let class = slot.entry.class();
                 match self.waiting[class].remove(&mut self.slots, index) {
                     true => self.release(index),
                     false => self.slots[index].stage = Stage::Abandoned,
@@ -182,7 +217,18 @@ pub(crate) struct Entry {
     pub(crate) since: Duration,
     /// How often it was sent.
     pub(crate) tries: u8,
+    /// It polls a unit of which nobody knows whether it will answer.
+    pub(crate) probe: bool,
     pub(crate) waker: Option<Waker>,
+}
+
+impl Entry {
+    fn class(&self) -> usize {
+        match self.probe {
+            true => PROBES,
+            false => self.job.priority.index(),
+        }
+    }
 }
 
 /// Room for one job and then for its result. The entry of a free slot means nothing.
@@ -268,10 +314,15 @@ mod tests {
             unit: 1,
             ask: Ask::Holding { address, count: 1 },
             priority,
-            timeout: Duration::ZERO,
+            timeout: Duration::from_secs(1),
+            short: false,
             registers: vec![address],
         };
-        Entry { job, since: Duration::ZERO, tries: 0, waker: None }
+        Entry { job, since: Duration::ZERO, tries: 0, probe: false, waker: None }
+    }
+
+    fn probe(address: u16) -> Entry {
+        Entry { probe: true, ..entry(Priority::Poll, address) }
     }
 
     fn address(entry: &Entry) -> u16 {
@@ -279,7 +330,11 @@ mod tests {
     }
 
     fn drain(queue: &mut Queue) -> Vec<u16> {
-        std::iter::from_fn(|| queue.pop().map(|place| address(queue.entry(place).unwrap()))).collect()
+        drain_at(queue, Duration::ZERO)
+    }
+
+    fn drain_at(queue: &mut Queue, now: Duration) -> Vec<u16> {
+        std::iter::from_fn(|| queue.pop(now).map(|place| address(queue.entry(place).unwrap()))).collect()
     }
 
     #[test]
@@ -301,9 +356,33 @@ mod tests {
 
         let mut wakes = Vec::new();
         queue.fail_waiting(|entry| address(entry).is_multiple_of(2).then_some(LinkError::Closed), &mut wakes);
-        let first = queue.pop().unwrap();
+        let first = queue.pop(Duration::ZERO).unwrap();
         queue.put_back(first);
-        assert_eq!(drain(&mut queue), [1, 3, 9]);
+        assert_eq!(drain(&mut queue), [3, 9, 1], "a second try comes last");
+        assert!(queue.is_empty());
+    }
+
+    #[test]
+    fn probes_come_last_but_not_never() {
+        let mut queue = Queue::new(4);
+        let fill = |queue: &mut Queue| {
+            for address in [1, 2] {
+                queue.push(probe(address));
+            }
+            for (address, priority) in [(3, Priority::Poll), (4, Priority::Poll), (5, Priority::Person)] {
+                queue.push(entry(priority, address));
+            }
+        };
+        fill(&mut queue);
+        assert_eq!(queue.room(Priority::Poll), Err(LinkError::QueueFull { waiting: 4 }));
+        assert_eq!(drain_at(&mut queue, Duration::from_millis(9_999)), [5, 3, 4, 1, 2]);
+        queue.push(entry(Priority::Poll, 0));
+        assert_eq!(drain(&mut queue), [0]);
+        // Each that has waited long enough makes one poll wait.
+        fill(&mut queue);
+        assert_eq!(drain_at(&mut queue, Duration::from_secs(10)), [5, 1, 3, 2, 4]);
+        let gone = queue.push(probe(6));
+        queue.cancel(gone);
         assert!(queue.is_empty());
     }
 
@@ -313,7 +392,7 @@ mod tests {
         let ticket = queue.push(entry(Priority::Person, 7));
         assert_eq!(queue.room(Priority::Person), Err(LinkError::QueueFull { waiting: 1 }));
         assert_eq!(queue.room(Priority::Poll), Ok(()));
-        let place = queue.pop().unwrap();
+        let place = queue.pop(Duration::ZERO).unwrap();
         queue.finish(place, Err(LinkError::Closed), &mut Vec::new());
         // What ends twice keeps its first end.
         queue.finish(place, Ok(()), &mut Vec::new());

@@ -1,6 +1,7 @@
 //! The task that owns a wire: it connects, keeps time, and does what `Wire` says. No rule lives here.
 
 use std::future::Future;
+use std::net::SocketAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, Waker, ready};
@@ -8,7 +9,7 @@ use std::time::{Duration, SystemTime};
 
 use tokio::net::{TcpStream, lookup_host};
 use tokio::time::{Instant, Sleep, sleep_until, timeout};
-use tracing::{info, warn};
+use tracing::{debug, info, warn};
 
 use crate::endpoint::Endpoint;
 use crate::error::Cause;
@@ -28,6 +29,23 @@ pub(crate) struct Task {
     /// Callers to wake once the lock is free.
     wakes: Vec<Waker>,
     tracer: Option<Box<Tracer>>,
+    told: Told,
+}
+
+/// Whether the log last said that the wire is up, if it said anything.
+#[derive(Debug, Default)]
+struct Told(Option<bool>);
+
+impl Told {
+    /// Whether the state is worth a line: a wire that stays down, or is up again before it was down, is not.
+    fn is_new(&mut self, state: &WireState) -> bool {
+        let up = match state {
+            WireState::Connecting => return false,
+            WireState::Connected => true,
+            WireState::Down { .. } => false,
+        };
+        self.0.replace(up) != Some(up)
+    }
 }
 
 /// An attempt to connect. Boxed: it is large and short-lived, and there may be thousands of idle wires.
@@ -43,6 +61,7 @@ impl Task {
             attempt: None,
             wakes: Vec::new(),
             tracer: options.trace.map(|trace| Box::new(Tracer::new(trace))),
+            told: Told::default(),
         }
     }
 
@@ -57,11 +76,14 @@ impl Task {
         }
     }
 
-    fn publish(&self, state: WireState) {
-        match &state {
-            WireState::Connecting => info!(endpoint = %self.endpoint, "connecting"),
-            WireState::Connected => info!(endpoint = %self.endpoint, "connected"),
-            WireState::Down { reason, .. } => warn!("{reason}"),
+    fn publish(&mut self, state: WireState) {
+        let endpoint = &self.endpoint;
+        match (&state, self.told.is_new(&state)) {
+            (WireState::Connecting, _) => debug!(%endpoint, "connecting"),
+            (WireState::Connected, true) => info!(%endpoint, "connected"),
+            (WireState::Connected, false) => debug!(%endpoint, "connected"),
+            (WireState::Down { reason, .. }, true) => warn!("{reason}"),
+            (WireState::Down { reason, .. }, false) => debug!("{reason}"),
         }
         self.shared.state.send_if_modified(|current| {
             let mut state = state;
@@ -174,35 +196,96 @@ fn state_of(phase: &Phase) -> WireState {
     }
 }
 
-/// Connects to the first address of the host that takes us.
+/// Connects to the host of the endpoint. To look its name up takes no longer than to connect.
 async fn connect(endpoint: Arc<Endpoint>, limit: Duration) -> Result<TcpStream, Cause> {
     let Endpoint::Tcp { host, port } = &*endpoint else {
         // `Link::open` lets nothing else through.
         return Err(Cause::Unreachable);
     };
-    let attempt = async {
-        let addresses = lookup_host((host.as_str(), *port)).await.map_err(|_| Cause::UnknownHost)?;
-        let mut cause = Cause::UnknownHost;
-        for address in addresses {
-            match TcpStream::connect(address).await {
-                Ok(stream) => {
-                    stream.set_nodelay(true).map_err(|error| Cause::from(&error))?;
-                    return Ok(stream);
-                }
-                Err(error) => cause = Cause::from(&error),
-            }
-        }
-        Err(cause)
+    let addresses = match timeout(limit, lookup_host((host.as_str(), *port))).await {
+        Ok(Ok(addresses)) => addresses,
+        Ok(Err(_)) | Err(_) => return Err(Cause::UnknownHost),
     };
-    match timeout(limit, attempt).await {
-        Ok(result) => result,
-        Err(_) => Err(Cause::ConnectTimedOut { after: limit }),
+    connect_to(addresses, limit).await
+}
+
+/// Connects to the first address that takes us. Each has the whole limit, so that one that is dead does not use up the
+/// time of the next.
+async fn connect_to(
+    addresses: impl Iterator<Item = SocketAddr>,
+    limit: Duration,
+) -> Result<TcpStream, Cause> {
+    let mut cause = Cause::UnknownHost;
+    for address in addresses {
+        cause = match timeout(limit, TcpStream::connect(address)).await {
+            Ok(Ok(stream)) => {
+                stream.set_nodelay(true).map_err(|error| Cause::from(&error))?;
+                return Ok(stream);
+            }
+            Ok(Err(error)) => Cause::from(&error),
+            Err(_) => Cause::ConnectTimedOut { after: limit },
+        };
     }
+    Err(cause)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io;
+
+    use tokio::net::{TcpListener, TcpSocket};
+
     use super::*;
+    use crate::error::Outage;
+
+    #[test]
+    fn the_log_hears_of_each_change_once() {
+        let down = || {
+            let endpoint: Arc<Endpoint> = Arc::new("tcp://10.0.0.7".parse().unwrap());
+            let reason = Outage { endpoint, cause: Cause::Refused };
+            WireState::Down { reason, since: SystemTime::UNIX_EPOCH }
+        };
+        let mut told = Told::default();
+        let states = [
+            (WireState::Connecting, false),
+            (down(), true),
+            (down(), false),
+            (WireState::Connected, true),
+            (WireState::Connecting, false),
+            (WireState::Connected, false),
+            (WireState::Connecting, false),
+            (down(), true),
+            (down(), false),
+        ];
+        for (index, (state, new)) in states.iter().enumerate() {
+            assert_eq!(told.is_new(state), *new, "{index}: {state:?}");
+        }
+    }
+
+    /// An address whose queue is full: attempts to connect to it hang.
+    async fn dead_address() -> io::Result<(SocketAddr, impl Sized)> {
+        let socket = TcpSocket::new_v4()?;
+        socket.bind(SocketAddr::from(([127, 0, 0, 1], 0)))?;
+        let listener = socket.listen(0)?;
+        let address = listener.local_addr()?;
+        let mut fillers = Vec::new();
+        while let Ok(filler) = timeout(Duration::from_millis(100), TcpStream::connect(address)).await {
+            fillers.push(filler?);
+        }
+        Ok((address, (listener, fillers)))
+    }
+
+    #[tokio::test]
+    async fn a_dead_address_leaves_time_for_the_next() {
+        let (dead, _filled) = dead_address().await.unwrap();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let good = listener.local_addr().unwrap();
+        let limit = Duration::from_millis(200);
+        let stream = connect_to([dead, good].into_iter(), limit).await.unwrap();
+        assert_eq!(stream.peer_addr().unwrap(), good);
+        let refused = connect_to([dead].into_iter(), limit).await.unwrap_err();
+        assert_eq!(refused, Cause::ConnectTimedOut { after: limit });
+    }
 
     #[test]
     fn is_small() {

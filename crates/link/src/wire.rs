@@ -14,10 +14,16 @@ use crate::error::{Cause, LinkError, Loss, Outage};
 use crate::job::{Job, Outcome, Priority};
 use crate::options::{Backoff, Options};
 use crate::queue::{Entry, Place, Queue, Ticket};
+use crate::silence::Silence;
 use crate::statistics::Statistics;
 
 /// Longer waits are cut to this, so that no sum of times overflows.
 const LONGEST_WAIT: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// A connection that drops is made anew at once only if it had lived so long, or had carried so many answers. Every
+/// other drop counts as a failure, so that a peer which hangs up after each answer gets no storm of connections.
+const PROVEN_AGE: Duration = Duration::from_secs(5);
+const PROVEN_ANSWERS: u64 = 100;
 
 /// One wire: what waits, what is under way, and what state the connection is in.
 #[derive(Debug)]
@@ -30,9 +36,8 @@ pub(crate) struct Wire {
     exchange: Option<Exchange>,
     /// No request leaves before this: spacing.
     earliest: Duration,
-    /// Time-outs in a row.
-    silent: u32,
-    /// Connections that failed since the last answer.
+    silence: Silence,
+    /// Connections that failed since the last one that proved good.
     failures: u32,
     /// The connection in use is no good any more, and the task does not know yet.
     hang_up: bool,
@@ -41,6 +46,8 @@ pub(crate) struct Wire {
     closed: bool,
     connections: u64,
     connected_at: Duration,
+    /// Answers before this connection.
+    answers_before: u64,
     statistics: Statistics,
 }
 
@@ -59,13 +66,14 @@ impl Wire {
             phase: Phase::Connecting { trying: false, since: Duration::ZERO },
             exchange: None,
             earliest: Duration::ZERO,
-            silent: 0,
+            silence: Silence::default(),
             failures: 0,
             hang_up: false,
             news: false,
             closed: false,
             connections: 0,
             connected_at: Duration::ZERO,
+            answers_before: 0,
             statistics: Statistics::default(),
         }
     }
@@ -78,7 +86,8 @@ impl Wire {
             return Err(Outcome { result: Err(error), registers: job.registers });
         }
         let job = Job { timeout: job.timeout.min(LONGEST_WAIT), ..job };
-        Ok(self.queue.push(Entry { job, since: now, tries: 0, waker: Some(waker.clone()) }))
+        let probe = job.priority == Priority::Poll && !self.silence.is_answering(job.unit);
+        Ok(self.queue.push(Entry { job, since: now, tries: 0, probe, waker: Some(waker.clone()) }))
     }
 
     /// The outcome of a job if there is one; otherwise `waker` will be woken for it.
@@ -102,7 +111,11 @@ impl Wire {
     pub(crate) fn close(&mut self, wakes: &mut Vec<Waker>) {
         self.closed = true;
         if let Some(exchange) = self.exchange.take() {
-            self.queue.finish(exchange.place, Err(LinkError::Closed), wakes);
+            let error = match exchange.may_have_left() {
+                true => LinkError::Lost { unit: exchange.unit, loss: Loss::Closed },
+                false => LinkError::Closed,
+            };
+            self.queue.finish(exchange.place, Err(error), wakes);
         }
         self.queue.fail_waiting(|_| Some(LinkError::Closed), wakes);
     }
@@ -144,9 +157,10 @@ impl Wire {
     /// The connection is made.
     pub(crate) fn connected(&mut self, now: Duration) {
         self.client.reset();
-        self.silent = 0;
+        self.silence.begin();
         self.connections += 1;
         self.connected_at = now;
+        self.answers_before = self.statistics.answers;
         self.enter(Phase::Connected);
     }
 
@@ -165,9 +179,10 @@ impl Wire {
         if let Some(exchange) = self.exchange.take() {
             self.drop_exchange(&exchange, cause, wakes);
         }
-        // Peers close idle connections, and that is nothing to report: one attempt at once. A connection that was
-        // short and brought no answer, after one that failed, earns no such trust.
-        if now.saturating_sub(self.connected_at) >= self.rules.backoff.max {
+        // Peers close idle connections, and that is nothing to report: one attempt at once. Nor is the first short
+        // connection, but the next one has to wait.
+        let proven = self.is_proven(now);
+        if proven {
             self.failures = 0;
         }
         self.failures += 1;
@@ -175,7 +190,11 @@ impl Wire {
             self.go_down(now, cause, wakes);
             return;
         }
-        self.enter(Phase::Connecting { trying: false, since: now });
+        let since = match proven {
+            true => now,
+            false => self.next_attempt(now),
+        };
+        self.enter(Phase::Connecting { trying: false, since });
     }
 
     /// Bytes came.
@@ -221,7 +240,10 @@ impl Wire {
         }
         match &mut self.phase {
             Phase::Connected => self.step_connected(now, out, wakes),
-            Phase::Connecting { trying: trying @ false, .. } => {
+            Phase::Connecting { trying: trying @ false, since } => {
+                if now < *since {
+                    return Step::Wait(Some(*since));
+                }
                 *trying = true;
                 Step::Connect
             }
@@ -251,7 +273,7 @@ impl Wire {
         if self.closed || self.hang_up || !free || now < self.earliest {
             return None;
         }
-        while let Some(place) = self.queue.pop() {
+        while let Some(place) = self.queue.pop(now) {
             match self.start(now, place, out) {
                 Ok(()) => return self.client.deadline(),
                 Err(error) => self.queue.finish(place, Err(error), wakes),
@@ -298,6 +320,9 @@ impl Wire {
         };
         let job = &entry.job;
         self.client.start(now, job.unit, &job.ask.request(), job.timeout, out)?;
+        if job.short {
+            self.client.accept_short();
+        }
         self.statistics.requests += 1;
         self.statistics.retries += u64::from(entry.tries > 0);
         self.statistics.bytes_sent += out.len() as u64;
@@ -320,8 +345,7 @@ impl Wire {
             return self.hang_up(now, Cause::Garbage, wakes);
         };
         let Some(exchange) = self.exchange.take() else { return };
-        self.failures = 0;
-        self.silent = 0;
+        self.silence.answered(exchange.unit);
         self.earliest = now + self.rules.spacing;
         self.statistics.answers += 1;
         self.statistics.latency.record(now.saturating_sub(exchange.started));
@@ -346,26 +370,27 @@ impl Wire {
 
     fn timed_out(&mut self, now: Duration, wakes: &mut Vec<Waker>) {
         self.statistics.timeouts += 1;
-        self.silent += 1;
         self.earliest = now + self.rules.spacing;
         if self.exchange.as_ref().is_some_and(|exchange| exchange.sent != Sent::Whole) {
             // Half a frame is in the connection: nothing may follow it.
             return self.hang_up(now, Cause::Stuck, wakes);
         }
-        if let Some(exchange) = self.exchange.take() {
-            let after = exchange.timeout;
-            let unit = exchange.unit;
-            if exchange.write {
-                let loss = Loss::TimedOut { after };
-                self.queue.finish(exchange.place, Err(LinkError::Lost { unit, loss }), wakes);
-            } else if !self.retry(&exchange) {
-                let tries = exchange.tries;
-                let error = LinkError::Timeout { unit, after, tries };
-                self.queue.finish(exchange.place, Err(error), wakes);
-            }
+        let Some(exchange) = self.exchange.take() else { return };
+        let Exchange { place, unit, timeout: after, tries, .. } = exchange;
+        let was_silent = tries == 1 && self.silence.is_silent(unit);
+        self.silence.timed_out(unit);
+        let waiting = self.queue.waiting().map(|entry| entry.job.unit);
+        let dead = self.silence.is_dead(self.rules.timeouts_to_drop, waiting);
+        // Who was silent before gets one try while others answer.
+        let again = !was_silent || dead || !self.silence.has_answering();
+        if exchange.write {
+            let loss = Loss::TimedOut { after };
+            self.queue.finish(place, Err(LinkError::Lost { unit, loss }), wakes);
+        } else if !again || !self.retry(&exchange) {
+            self.queue.finish(place, Err(LinkError::Timeout { unit, after, tries }), wakes);
         }
-        if self.silent >= self.rules.timeouts_to_drop {
-            let requests = self.silent;
+        if dead {
+            let requests = self.silence.timeouts();
             self.hang_up(now, Cause::Silent { requests }, wakes);
         }
     }
@@ -373,7 +398,7 @@ impl Wire {
     /// Ends or requeues the exchange that a drop cut off.
     fn drop_exchange(&mut self, exchange: &Exchange, cause: Cause, wakes: &mut Vec<Waker>) {
         let reason = self.outage(cause);
-        let error = match exchange.write && exchange.sent != Sent::Nothing {
+        let error = match exchange.may_have_left() {
             true => LinkError::Lost { unit: exchange.unit, loss: Loss::Dropped(reason) },
             false => LinkError::Down { reason },
         };
@@ -382,17 +407,31 @@ impl Wire {
         }
     }
 
-    /// Puts a read back in front of its class if it may be sent once more. The one place where
+    /// Puts a read back behind the others of its class if it may be sent once more. The one place where
     /// anything is sent again, and no write gets past its first line.
     fn retry(&mut self, exchange: &Exchange) -> bool {
         if exchange.write || exchange.tries > self.rules.retries {
             return false;
         }
-        let wanted = self.queue.entry(exchange.place).is_some();
-        if wanted {
-            self.queue.put_back(exchange.place);
-        }
-        wanted
+        let Some(entry) = self.queue.entry(exchange.place) else {
+            return false;
+        };
+        entry.probe = entry.job.priority == Priority::Poll && !self.silence.is_answering(exchange.unit);
+        self.queue.put_back(exchange.place);
+        true
+    }
+
+    /// Whether the connection in use was good for something before it ended. Age alone proves nothing for one that
+    /// left requests without an answer.
+    fn is_proven(&self, now: Duration) -> bool {
+        let answers = self.statistics.answers - self.answers_before;
+        let is_old = now.saturating_sub(self.connected_at) >= PROVEN_AGE;
+        answers >= PROVEN_ANSWERS || is_old && (answers > 0 || self.silence.timeouts() == 0)
+    }
+
+    /// When to connect again after a failure.
+    fn next_attempt(&self, now: Duration) -> Duration {
+        now + self.rules.backoff.delay(self.failures).min(LONGEST_WAIT)
     }
 
     /// Ends the connection by our own choice.
@@ -410,11 +449,7 @@ impl Wire {
             },
             wakes,
         );
-        self.enter(Phase::Down {
-            retry_at: now + self.rules.backoff.delay(self.failures).min(LONGEST_WAIT),
-            trying: false,
-            reason,
-        });
+        self.enter(Phase::Down { retry_at: self.next_attempt(now), trying: false, reason });
     }
 
     /// While a connection is being made a request waits as long as it would wait for an answer.
@@ -474,7 +509,7 @@ impl Step {
 /// The state of the connection.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Phase {
-    /// Being made for the first time, or at once after it dropped: requests wait.
+    /// Being made for the first time, or soon after it dropped: requests wait. It begins at `since`.
     Connecting { trying: bool, since: Duration },
     /// Up.
     Connected,
@@ -494,6 +529,13 @@ struct Exchange {
     sent: Sent,
 }
 
+impl Exchange {
+    /// Whether it is a write of which the device may know.
+    fn may_have_left(&self) -> bool {
+        self.write && self.sent != Sent::Nothing
+    }
+}
+
 /// How much of a request the system has taken.
 #[derive(Debug, PartialEq, Eq)]
 enum Sent {
@@ -510,6 +552,8 @@ struct Rules {
     backoff: Backoff,
 }
 
+#[cfg(test)]
+mod pace;
 #[cfg(test)]
 mod promises;
 #[cfg(test)]

@@ -168,6 +168,17 @@ impl Client {
         Ok(())
     }
 
+    /// The transaction under way may also be answered by fewer registers than it asks for, if not by none.
+    ///
+    /// For devices that are known to cut long reads. From any other a short answer belongs to something else, so
+    /// without this it is dropped and counted as a wrong length. To be called behind [`start`](Self::start), for each
+    /// transaction anew.
+    pub fn accept_short(&mut self) {
+        if let State::Waiting(waiting) = &mut self.state {
+            waiting.expected = waiting.expected.or_short();
+        }
+    }
+
     /// Takes bytes in, in whatever pieces they come, and says what they changed.
     ///
     /// An answer that is in hand before the transaction was given up is taken, however late `now` is; without one,
@@ -226,7 +237,7 @@ impl Client {
     }
 
     /// The answer, from [`Progress::Answered`] until the next start or reset. Coils and inputs are as many as were
-    /// asked for; registers may be fewer, where a device cuts long reads.
+    /// asked for, and registers too unless [`accept_short`](Self::accept_short) was called.
     #[must_use]
     pub fn response(&self) -> Option<Response<'_>> {
         let State::Answered(expected) = self.state else {

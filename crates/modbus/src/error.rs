@@ -87,7 +87,7 @@ pub enum Mismatch {
         /// The function answered, without the exception bit.
         found: u8,
     },
-    /// More data than asked, none at all, or fewer coils than asked.
+    /// More or less data than asked.
     #[error("{found} bytes of data came, {expected} were asked for")]
     Length {
         /// Data bytes of a full answer.

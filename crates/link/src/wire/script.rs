@@ -56,7 +56,23 @@ impl Script {
     }
 
     pub(super) fn submit(&mut self, at: u64, priority: Priority, ask: Ask) -> Result<Ticket, LinkError> {
-        let job = Job { unit: 1, ask, priority, timeout: ms(TIMEOUT), registers: Vec::new() };
+        self.submit_to(at, 1, priority, ask)
+    }
+
+    pub(super) fn submit_to(
+        &mut self,
+        at: u64,
+        unit: u8,
+        priority: Priority,
+        ask: Ask,
+    ) -> Result<Ticket, LinkError> {
+        self.submit_job(
+            at,
+            Job { unit, ask, priority, timeout: ms(TIMEOUT), short: false, registers: Vec::new() },
+        )
+    }
+
+    pub(super) fn submit_job(&mut self, at: u64, job: Job) -> Result<Ticket, LinkError> {
         let waker = Waker::from(Arc::clone(&self.woken));
         let submitted = self.wire.submit(ms(at), job, &waker);
         submitted.map_err(|outcome| outcome.result.unwrap_err())

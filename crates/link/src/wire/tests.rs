@@ -99,6 +99,39 @@ fn gives_a_silent_read_up_after_its_retry() {
 }
 
 #[test]
+fn tries_a_silent_unit_once_while_others_answer() {
+    let mut script = Script::connected();
+    let tries_of = |script: &mut Script, at| {
+        let ticket = script.submit_to(at, 2, Priority::Person, read(1)).unwrap();
+        script.sends(at);
+        if script.step(at + TIMEOUT) != Step::Wait(None) {
+            assert_eq!(script.step(at + 2 * TIMEOUT), Step::Wait(None));
+        }
+        script.outcome(&ticket)
+    };
+    let timeout = |tries| Some(Err(LinkError::Timeout { unit: 2, after: ms(TIMEOUT), tries }));
+    script.read(0);
+    script.sends(0);
+    script.hears(0, &answer(1));
+    assert_eq!(tries_of(&mut script, 0), timeout(2));
+    assert_eq!(tries_of(&mut script, 2000), timeout(1));
+    assert_eq!(tries_of(&mut script, 3000), timeout(1));
+}
+
+#[test]
+fn lets_a_read_go_before_a_retry() {
+    let mut script = Script::connected();
+    let silent = script.submit_to(0, 2, Priority::Person, read(1)).unwrap();
+    script.sends(0);
+    let good = script.read(1);
+    assert_eq!(script.sends(1000)[6], 1);
+    script.hears(1001, &answer(2));
+    assert_eq!(script.outcome(&good), Some(Ok(vec![2302, 0])));
+    assert_eq!(script.sends(1001)[6], 2);
+    assert_eq!(script.outcome(&silent), None);
+}
+
+#[test]
 fn lets_a_command_go_before_a_retry() {
     let mut script = Script::connected();
     script.read(0);
@@ -173,9 +206,11 @@ fn sends_a_dropped_read_again_on_a_new_connection() {
     script.sends(0);
     script.hears(5, &answer(1)[..9]);
     script.loses(6, Cause::Reset);
-    script.connect(6);
-    assert_eq!(script.sends(7), frame(2, &[0x03, 0x28, 0x06, 0, 2]));
-    script.hears(8, &answer(2));
+    // The connection was a short one: not at once.
+    assert_eq!(script.step(6), Step::Wait(Some(ms(206))));
+    script.connect(206);
+    assert_eq!(script.sends(207), frame(2, &[0x03, 0x28, 0x06, 0, 2]));
+    script.hears(208, &answer(2));
     assert_eq!(script.outcome(&ticket), Some(Ok(vec![2302, 0])));
     assert_eq!(script.statistics().reconnects, 1);
 }
@@ -187,8 +222,8 @@ fn does_not_send_a_dropped_write_again() {
     script.sends(0);
     script.loses(5, Cause::Closed);
     assert_eq!(script.outcome(&ticket), Some(Err(lost(Cause::Closed))));
-    script.connect(5);
-    assert_eq!(script.step(6), Step::Wait(None));
+    script.connect(205);
+    assert_eq!(script.step(206), Step::Wait(None));
 }
 
 #[test]
@@ -199,18 +234,18 @@ fn fails_everything_that_waits_when_it_goes_down() {
     let write = script.write(1, 4);
     script.loses(5, Cause::Closed);
     assert_eq!(script.outcome(&write), None, "one attempt to reconnect first");
-    assert_eq!(script.step(5), Step::Connect);
-    script.refuses(6, Cause::Refused);
+    assert_eq!(script.step(205), Step::Connect);
+    script.refuses(206, Cause::Refused);
     assert_eq!(script.outcome(&read), Some(Err(down(Cause::Refused))));
     assert_eq!(script.outcome(&write), Some(Err(down(Cause::Refused))));
     assert_eq!(script.statistics().requests, 1, "the write was not sent");
 
-    let refused = script.submit(7, Priority::Command, super::script::write(4));
+    let refused = script.submit(207, Priority::Command, super::script::write(4));
     assert_eq!(refused, Err(down(Cause::Refused)));
 }
 
 #[test]
-fn backs_off_until_an_answer_comes() {
+fn backs_off_until_a_connection_proves_good() {
     let mut script = Script::new();
     let mut now = 0;
     let mut waits = Vec::new();
@@ -233,20 +268,71 @@ fn backs_off_until_an_answer_comes() {
     assert_eq!(script.step(now), Step::Wait(Some(ms(now + 10_000))));
     now += 10_000;
 
-    // One that lasts does, and one that answers.
+    // An answer alone does not either.
     script.connect(now);
-    now += 10_000;
+    script.read(now);
+    script.sends(now);
+    script.hears(now, &answer(1));
+    script.loses(now + 4_999, Cause::Closed);
+    assert_eq!(script.step(now + 4_999), Step::Wait(Some(ms(now + 14_999))));
+    now += 14_999;
+
+    // One that lasts does.
+    script.connect(now);
+    now += 5_000;
     script.loses(now, Cause::Closed);
     assert_eq!(script.step(now), Step::Connect);
     script.refuses(now, Cause::Refused);
     assert_eq!(script.step(now), Step::Wait(Some(ms(now + 400))));
     now += 400;
+
+    // And one that carries much, however fast.
     script.connect(now);
-    script.read(now);
-    script.sends(now);
-    script.hears(now, &answer(1));
+    for transaction in 2..102 {
+        script.read(now);
+        script.sends(now);
+        script.hears(now, &answer(transaction));
+    }
     script.loses(now, Cause::Closed);
     assert_eq!(script.step(now), Step::Connect);
+}
+
+#[test]
+fn a_connection_that_never_answers_is_not_good_because_it_is_old() {
+    let mut script = Script::connected();
+    for now in [0, 3000, 6000] {
+        script.write(now, 4);
+        script.sends(now);
+        let expected = if now == 6000 { Step::Disconnect } else { Step::Wait(None) };
+        assert_eq!(script.step(now + TIMEOUT), expected);
+    }
+    assert_eq!(script.step(7000), Step::Wait(Some(ms(7200))));
+    script.connect(7200);
+    // It was idle, which is no fault.
+    script.loses(12_200, Cause::Closed);
+    assert_eq!(script.step(12_200), Step::Connect);
+}
+
+#[test]
+fn our_own_pause_costs_no_request_its_time() {
+    let mut script = Script::connected();
+    let job = Job {
+        unit: 1,
+        ask: read(1),
+        priority: Priority::Person,
+        timeout: ms(50),
+        short: false,
+        registers: Vec::new(),
+    };
+    let ticket = script.submit_job(0, job).unwrap();
+    script.step(0);
+    script.loses(10, Cause::Reset);
+    assert_eq!(script.step(199), Step::Wait(Some(ms(210))));
+    assert_eq!(script.step(210), Step::Connect);
+    assert_eq!(script.step(210), Step::Wait(Some(ms(260))));
+    assert_eq!(script.outcome(&ticket), None);
+    script.step(260);
+    assert_eq!(script.outcome(&ticket), Some(Err(down(Cause::StillConnecting { after: ms(50) }))));
 }
 
 #[test]
@@ -302,12 +388,12 @@ fn says_why_when_even_a_new_connection_is_silent() {
     let ticket = script.read(0);
     script.sends(0);
     assert_eq!(script.step(1000), Step::Disconnect);
-    script.connect(1000);
-    script.sends(1000);
-    assert_eq!(script.step(2000), Step::Disconnect);
-    assert_eq!(script.step(2000), Step::Wait(Some(ms(2400))));
+    script.connect(1200);
+    script.sends(1200);
+    assert_eq!(script.step(2200), Step::Disconnect);
+    assert_eq!(script.step(2200), Step::Wait(Some(ms(2600))));
     assert!(matches!(script.outcome(&ticket), Some(Err(LinkError::Timeout { tries: 2, .. }))));
-    let refused = script.submit(2001, Priority::Person, read(1));
+    let refused = script.submit(2201, Priority::Person, read(1));
     assert_eq!(refused, Err(down(Cause::Silent { requests: 1 })));
 }
 
@@ -320,13 +406,13 @@ fn hangs_up_on_bytes_that_are_no_modbus() {
     script.hears(1, &[answer(1), b"HTTP/1.1 400 Bad Request".to_vec()].concat());
     assert_eq!(script.outcome(&read), Some(Ok(vec![2302, 0])));
     assert_eq!(script.step(1), Step::Disconnect);
-    script.connect(1);
+    script.connect(201);
 
-    let write = script.write(2, 4);
-    script.sends(2);
-    script.hears(3, &[0xFF; 40]);
+    let write = script.write(202, 4);
+    script.sends(202);
+    script.hears(203, &[0xFF; 40]);
     assert_eq!(script.outcome(&write), Some(Err(lost(Cause::Garbage))));
-    assert_eq!(script.step(3), Step::Disconnect);
+    assert_eq!(script.step(203), Step::Disconnect);
     assert!(script.statistics().garbage_bytes >= 40);
 }
 
@@ -373,9 +459,9 @@ fn never_sends_behind_half_a_frame() {
         let read = script.read(1);
         assert_eq!(script.step(1000), Step::Disconnect);
         assert_eq!(script.outcome(&write), Some(Err(write_fails_with)));
-        script.connect(1000);
-        script.sends(1000);
-        script.hears(1001, &answer(2));
+        script.connect(1200);
+        script.sends(1200);
+        script.hears(1201, &answer(2));
         assert_eq!(script.outcome(&read), Some(Ok(vec![2302, 0])));
     }
 
@@ -416,6 +502,7 @@ fn takes_for_ever_as_a_day() {
         ask: read(1),
         priority: Priority::Poll,
         timeout: Duration::MAX,
+        short: false,
         registers: Vec::new(),
     };
     script.wire.submit(ms(0), endless, Waker::noop()).unwrap();
@@ -427,9 +514,10 @@ fn takes_for_ever_as_a_day() {
     script.read(0);
     assert_eq!(script.step(0), Step::Wait(Some(day)));
     script.loses(0, Cause::Closed);
-    assert_eq!(script.step(0), Step::Connect);
-    script.refuses(0, Cause::Refused);
     assert_eq!(script.step(0), Step::Wait(Some(day)));
+    assert_eq!(script.step(86_400_000), Step::Connect);
+    script.refuses(86_400_000, Cause::Refused);
+    assert_eq!(script.step(86_400_000), Step::Wait(Some(2 * day)));
 }
 
 #[test]
@@ -444,6 +532,36 @@ fn ends_everything_when_closed() {
     assert_eq!(script.outcome(&waiting), Some(Err(LinkError::Closed)));
     assert_eq!(script.step(2), Step::End);
     assert_eq!(script.submit(3, Priority::Person, read(1)), Err(LinkError::Closed));
+
+    let mut script = Script::connected();
+    let flying = script.write(0, 4);
+    script.sends(0);
+    script.wire.close(&mut script.wakes);
+    let lost = LinkError::Lost { unit: 1, loss: Loss::Closed };
+    assert_eq!(script.outcome(&flying), Some(Err(lost)), "it has left");
+}
+
+#[test]
+fn takes_a_short_answer_only_for_who_allows_it() {
+    let mut script = Script::connected();
+    let job = |short| Job {
+        unit: 1,
+        ask: read(1),
+        priority: Priority::Person,
+        timeout: ms(TIMEOUT),
+        short,
+        registers: Vec::new(),
+    };
+    for (transaction, short, registers) in
+        [(1, true, Some(vec![7])), (2, false, None), (3, true, Some(vec![7]))]
+    {
+        let ticket = script.submit_job(0, job(short)).unwrap();
+        script.sends(0);
+        script.hears(0, &frame(transaction, &[0x03, 2, 0, 7]));
+        assert_eq!(script.outcome(&ticket), registers.map(Ok));
+        script.hears(0, &answer(transaction));
+    }
+    assert_eq!(script.statistics().wrong_length, 1);
 }
 
 #[test]
@@ -455,7 +573,7 @@ fn reports_each_change_of_the_connection_once() {
     assert_eq!(script.wire.news(), None);
     script.loses(1, Cause::Closed);
     assert!(matches!(script.wire.news(), Some(Phase::Connecting { .. })));
-    script.step(1);
-    script.refuses(2, Cause::Refused);
+    script.step(201);
+    script.refuses(202, Cause::Refused);
     assert!(matches!(script.wire.news(), Some(Phase::Down { .. })));
 }

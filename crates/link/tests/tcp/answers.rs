@@ -173,3 +173,29 @@ async fn shows_every_frame_both_ways() {
         ]
     );
 }
+
+#[tokio::test]
+async fn takes_a_short_answer_only_for_who_allows_it() {
+    let (listener, endpoint) = listener().await;
+    let peer = async move {
+        let (mut stream, _) = listener.accept().await.unwrap();
+        for full in [&[3, 4, 0, 1, 0, 2][..], &[], &[3, 4, 0, 3, 0, 4]] {
+            let asked = request(&mut stream).await;
+            stream.write_all(&register(&asked, 111)).await.unwrap();
+            if !full.is_empty() {
+                stream.write_all(&frame([asked[0], asked[1]], UNIT, full)).await.unwrap();
+            }
+        }
+        hung_up(stream).await;
+    };
+    let client = async {
+        let link = Link::open(endpoint, patient()).unwrap();
+        let cutting = link.with_short_answers(true);
+        assert_eq!(link.read_registers(UNIT, 3, ADDRESS, 2).await, Ok(vec![1, 2]));
+        assert_eq!(cutting.read_registers(UNIT, 3, ADDRESS, 2).await, Ok(vec![111]));
+        // It is the handle that allows it, not the wire.
+        assert_eq!(link.read_registers(UNIT, 3, ADDRESS, 2).await, Ok(vec![3, 4]));
+        assert_eq!(cutting.with_short_answers(false).statistics().wrong_length, 2);
+    };
+    play(peer, client).await;
+}

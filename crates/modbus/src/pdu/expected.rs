@@ -14,8 +14,8 @@ pub(crate) struct Expected {
 enum Shape {
     /// So many coils or inputs, in just as many bytes as they need.
     Bits { count: u16 },
-    /// So many registers at most: Datakom controllers cut longer reads to 16 and send those.
-    Registers { count: u16 },
+    /// So many registers; fewer only where that is allowed.
+    Registers { count: u16, short: bool },
     /// The four bytes after the function code come back.
     Echo([u8; 4]),
     /// Anything.
@@ -29,7 +29,7 @@ impl Expected {
                 Shape::Bits { count }
             }
             Request::ReadHoldingRegisters { count, .. } | Request::ReadInputRegisters { count, .. } => {
-                Shape::Registers { count }
+                Shape::Registers { count, short: false }
             }
             Request::WriteSingleCoil { address, value } | Request::WriteSingleRegister { address, value } => {
                 echo(address, value)
@@ -41,6 +41,15 @@ impl Expected {
             Request::Other { .. } => Shape::Any,
         };
         Self { function: request.function(), shape }
+    }
+
+    /// The same, but a read of registers may be answered by fewer than were asked for, if not by none: Datakom
+    /// controllers cut longer reads to 16 and send those.
+    pub(crate) fn or_short(mut self) -> Self {
+        if let Shape::Registers { short, .. } = &mut self.shape {
+            *short = true;
+        }
+        self
     }
 
     /// How many coils or inputs were asked for, where that was the question.
@@ -55,7 +64,7 @@ impl Expected {
     pub(crate) fn data_bytes(self) -> Option<usize> {
         match self.shape {
             Shape::Bits { count } => Some(usize::from(count).div_ceil(8)),
-            Shape::Registers { count } => Some(2 * usize::from(count)),
+            Shape::Registers { count, .. } => Some(2 * usize::from(count)),
             Shape::Echo(_) | Shape::Any => None,
         }
     }
@@ -86,7 +95,7 @@ impl Expected {
         let Some(expected) = self.data_bytes() else {
             return Ok(());
         };
-        let short = matches!(self.shape, Shape::Registers { .. }) && found.is_multiple_of(2);
+        let short = matches!(self.shape, Shape::Registers { short: true, .. }) && found.is_multiple_of(2);
         if found == expected || (short && found > 0 && found < expected) {
             return Ok(());
         }

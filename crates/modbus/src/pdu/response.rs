@@ -170,14 +170,23 @@ impl<'a> Response<'a> {
         }
     }
 
-    /// Whether this answers the request: same function, writes confirmed word for word, a read of coils or inputs in
-    /// full, a read of registers in full **or short but not empty** (Datakom controllers send the first 16 of a
-    /// longer read; the caller sees the length). An exception of the same function always does.
+    /// Whether this answers the request: same function, writes confirmed word for word, a read with just as much data
+    /// as was asked for. An exception of the same function always does.
     ///
     /// # Errors
     /// The first [`Mismatch`] found.
     pub fn answers(&self, request: &Request<'_>) -> Result<(), Mismatch> {
         Expected::of(request).check(self)
+    }
+
+    /// Like [`answers`](Self::answers), but a read of registers may also be **short, if not empty**: Datakom
+    /// controllers send the first 16 of a longer read. Only the caller can know that its device does so; from any
+    /// other a short answer is a wrong one.
+    ///
+    /// # Errors
+    /// The first [`Mismatch`] found.
+    pub fn answers_in_part(&self, request: &Request<'_>) -> Result<(), Mismatch> {
+        Expected::of(request).or_short().check(self)
     }
 }
 
@@ -299,13 +308,19 @@ mod tests {
     }
 
     #[test]
-    fn a_read_of_registers_may_be_short_and_nothing_else() {
+    fn a_read_of_registers_may_be_short_where_that_is_allowed_and_nothing_else() {
         let read = Request::ReadHoldingRegisters { address: 0x2800, count: 3 };
         let length = |found| Err(Mismatch::Length { expected: 6, found });
-        let cases: [(&[u16], Result<(), Mismatch>); 5] =
-            [(&[], length(0)), (&[1], Ok(())), (&[1, 2], Ok(())), (&[1, 2, 3], Ok(())), (&[0; 4], length(8))];
-        for (words, verdict) in cases {
-            assert_eq!(Response::ReadHoldingRegisters(words.into()).answers(&read), verdict, "{words:?}");
+        for (words, whole, part) in [
+            (&[][..], length(0), length(0)),
+            (&[1], length(2), Ok(())),
+            (&[1, 2], length(4), Ok(())),
+            (&[1, 2, 3], Ok(()), Ok(())),
+            (&[0; 4], length(8), length(8)),
+        ] {
+            let response = Response::ReadHoldingRegisters(words.into());
+            assert_eq!(response.answers(&read), whole, "{words:?}");
+            assert_eq!(response.answers_in_part(&read), part, "{words:?}");
         }
         let coils = Request::ReadCoils { address: 0, count: 9 };
         for (bytes, verdict) in [
@@ -313,7 +328,9 @@ mod tests {
             (&[0; 2], Ok(())),
             (&[0; 3], Err(Mismatch::Length { expected: 2, found: 3 })),
         ] {
-            assert_eq!(Response::ReadCoils(Bits::from_bytes(bytes)).answers(&coils), verdict, "{bytes:?}");
+            let response = Response::ReadCoils(Bits::from_bytes(bytes));
+            assert_eq!(response.answers(&coils), verdict, "{bytes:?}");
+            assert_eq!(response.answers_in_part(&coils), verdict, "{bytes:?}");
         }
     }
 

@@ -246,7 +246,11 @@ impl Context {
             Kind::Request => Request::decode(pdu).ok(),
             _ => None,
         };
-        let now_asked = request.map(|request| Asked { transaction, unit, expected: Expected::of(&request) });
+        let now_asked = request.map(|request| {
+            // Nobody tells a listener what the device does with long reads.
+            let expected = Expected::of(&request).or_short();
+            Asked { transaction, unit, expected }
+        });
         match self {
             Self::Line(asked) if kind == Kind::Request => *asked = now_asked,
             Self::Line(asked) => {
