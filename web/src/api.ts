@@ -309,6 +309,11 @@ export interface components {
             /** @description How many alarms of each class are active. */
             alarms: components["schemas"]["AlarmCounts"];
             /**
+             * @description Why alarms and their counts are not to be relied on as they stand; null while all of them are read well.
+             * @example shutdown_alarms: the device answered exception 2 (illegal address)
+             */
+            alarms_fault: string | null;
+            /**
              * @description One sentence on what is wrong with reaching the device; null while nothing is.
              * @example Genset 1 cannot be read: unit 1 did not answer within 1s, asked 2 times: check the unit id and that the device is on
              */
@@ -452,8 +457,8 @@ export interface components {
             page: number | null;
             /**
              * Format: int32
-             * @description The same register in the 4xxxx numbers of PLCs: 40001 + address.
-             * @example 50247
+             * @description The same register in the 4xxxx numbers of PLCs: 40001 + address up to address 9998, 400001 + address above.
+             * @example 410247
              */
             plc: number;
             /** @description How often it is read: its own rate, where that is not its group's. */
@@ -699,6 +704,31 @@ export interface components {
              * @description Requests that nobody answered in time.
              */
             timeouts: number;
+            /**
+             * Format: int64
+             * @description Confirmations of another write than was sent.
+             */
+            wrong_echo: number;
+            /**
+             * Format: int64
+             * @description Answers with another function than the request.
+             */
+            wrong_function: number;
+            /**
+             * Format: int64
+             * @description Answers with more or less data than was asked for.
+             */
+            wrong_length: number;
+            /**
+             * Format: int64
+             * @description Frames of another protocol than Modbus.
+             */
+            wrong_protocol: number;
+            /**
+             * Format: int64
+             * @description Answers from another unit than the one that was asked.
+             */
+            wrong_unit: number;
         };
         /** @description One wire and how it does. */
         WireView: {

@@ -1,6 +1,6 @@
 //! Active alarms of one device: which bits are set, of which class, and since when.
 
-use busbar_profile::{BitSet, Class, Profile};
+use busbar_profile::{BitSet, Class, Profile, Rate};
 
 use crate::api::types::{AlarmCounts, AlarmView, Time};
 
@@ -70,6 +70,17 @@ impl Alarms {
         };
         self.active.iter().map(view).collect()
     }
+}
+
+/// Indexes of the polled points that alarms are read from.
+pub(crate) fn sources(profile: &Profile) -> Vec<usize> {
+    let points = profile.points.iter().enumerate();
+    let alarms = |class: Option<Class>| class.is_some_and(Class::is_alarm);
+    points
+        .filter(|(_, point)| point.access.is_readable() && point.rate != Rate::OnDemand)
+        .filter(|(_, point)| alarms(point.class) || point.bits.iter().any(|bit| alarms(bit.class)))
+        .map(|(index, _)| index)
+        .collect()
 }
 
 /// The class of a bit when a set one is an alarm; an unnamed bit is of its point's class.

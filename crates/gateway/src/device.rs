@@ -8,13 +8,14 @@ use std::time::Duration;
 use busbar_profile::plan::Read;
 use busbar_profile::{Decoded, Image, Profile, Quality, Rate, reading};
 
-use crate::alarms::Alarms;
+use crate::alarms::{self, Alarms};
 use crate::api::types::{
     AlarmView, BitView, ChoiceView, DeviceView, GroupView, ModeView, PointView, PointsView, StateView, Time,
     ValueView,
 };
 use crate::failure::Failure;
-use crate::poll_plan::{POLLED, polled};
+use crate::poll_plan::polled;
+use crate::rates::{POLLED, Rates};
 use crate::site::SiteDevice;
 
 /// A value is stale after so many missed rounds...
@@ -25,7 +26,8 @@ const STALE_AT_LEAST: Duration = Duration::from_secs(5);
 /// What one poll round brought.
 #[derive(Debug)]
 pub(crate) struct Round {
-    pub(crate) rate: Rate,
+    /// What was due.
+    pub(crate) rates: Rates,
     /// Registers that came, by address.
     pub(crate) answers: Vec<(u16, Vec<u16>)>,
     /// Reads that failed, and why.
@@ -62,10 +64,14 @@ pub(crate) struct Device {
     /// By index in the profile.
     points: Vec<Point>,
     /// Indexes of the polled points, for each of [`POLLED`].
-    polled: [Vec<usize>; 3],
+    polled: [Vec<usize>; POLLED.len()],
+    /// When the last round was finished that the device answered, for each of [`POLLED`].
+    rounds: [Option<Time>; POLLED.len()],
     state: Option<usize>,
     mode: Option<usize>,
     alarms: Alarms,
+    /// Indexes of the points that alarms are read from.
+    alarm_points: Vec<usize>,
     online: bool,
     fault: Option<String>,
     /// Why it cannot be reached at all; none while it answers.
@@ -112,9 +118,11 @@ impl Device {
             image: Image::new(profile),
             points: vec![Point::UNREAD; profile.points.len()],
             polled: POLLED.map(|rate| polled(profile, rate)),
+            rounds: [None; POLLED.len()],
             state: states.into_iter().find_map(signal),
             mode: signal("mode"),
             alarms: Alarms::default(),
+            alarm_points: alarms::sources(profile),
             online: false,
             fault: None,
             silence: None,
@@ -182,10 +190,10 @@ impl Device {
         expired
     }
 
-    /// When the newest value of a rate was read; what is good of that rate was all read then.
-    pub(crate) fn last_read(&self, rate: Rate) -> Option<Time> {
-        let polled = POLLED.iter().position(|polled| *polled == rate)?;
-        self.polled[polled].iter().filter_map(|index| self.points[*index].read).map(|(_, ts)| ts).max()
+    /// When the last round of a rate was; what is good of that rate was all read then, or since then on the way to
+    /// something else.
+    pub(crate) fn last_round(&self, rate: Rate) -> Option<Time> {
+        POLLED.iter().zip(&self.rounds).find(|(polled, _)| **polled == rate).and_then(|(_, ts)| *ts)
     }
 
     /// Whether the device answered, and what to say if it did not.
@@ -200,11 +208,16 @@ impl Device {
                 // Nothing was due: nothing is known.
                 return;
             }
+            for (rate, last) in POLLED.iter().zip(&mut self.rounds) {
+                if round.rates.contains(*rate) {
+                    *last = Some(ts);
+                }
+            }
             self.online = true;
             self.silence = None;
             self.fault = refused
                 .filter(|_| round.answers.is_empty())
-                .map(|(_, failure)| format!("{name} answers, but refuses what it is asked: {failure}"));
+                .map(|(_, failure)| format!("{name} answers, but refuses what it is asked: {failure}; check that it is what its profile is for"));
             return;
         };
         if !self.silence.as_ref().is_some_and(|known| failure.is_no_news_after(known)) {
@@ -289,9 +302,9 @@ impl Device {
 
     /// The points of the round that did not come take the failure of the read they were in.
     fn fail_uncovered(&mut self, round: &Round, covered: &[bool], changed: &mut Vec<usize>) {
-        let Some(rate) = POLLED.iter().position(|rate| *rate == round.rate) else { return };
+        let due = POLLED.iter().zip(&self.polled).filter(|(rate, _)| round.rates.contains(**rate));
         let missing: Vec<usize> =
-            self.polled[rate].iter().copied().filter(|index| !covered[*index]).collect();
+            due.flat_map(|(_, points)| points).copied().filter(|index| !covered[*index]).collect();
         for (read, failure) in &round.failures {
             let end = u32::from(read.address) + u32::from(read.count);
             let points = &self.site.profile.points;
@@ -350,8 +363,21 @@ impl Device {
             state: self.state.and_then(|index| self.state_view(index)),
             mode: self.mode.and_then(|index| self.mode_view(index)),
             alarms: self.alarms.counts(),
+            alarms_fault: self.alarms_fault(),
             last_seen: self.last_seen,
         }
+    }
+
+    /// What is wrong with the first point that alarms are read from and that is not good.
+    fn alarms_fault(&self) -> Option<String> {
+        let bad = |index: &&usize| self.points[**index].quality() != Quality::Good;
+        let index = *self.alarm_points.iter().find(bad)?;
+        let (id, point) = (&self.site.profile.points[index].id, &self.points[index]);
+        Some(match &point.failure {
+            Some(failure) => format!("{id}: {failure}"),
+            None if point.read.is_none() => format!("{id}: not read yet"),
+            None => format!("{id}: not read for too long"),
+        })
     }
 
     fn state_view(&self, index: usize) -> Option<StateView> {

@@ -6,6 +6,8 @@ use thiserror::Error;
 
 /// Exception code of a device that knows no such address.
 const ILLEGAL_DATA_ADDRESS: u8 = 0x02;
+/// The last of the exception codes by which a device says that it never answers such a read.
+const ILLEGAL_DATA_VALUE: u8 = 0x03;
 
 /// Why a read gave no registers for a point.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -41,6 +43,16 @@ impl Failure {
     /// Whether the device does not know one of the addresses it was asked for.
     pub(crate) fn is_illegal_address(&self) -> bool {
         matches!(self, Self::Exception { code: ILLEGAL_DATA_ADDRESS, .. })
+    }
+
+    /// Whether the same read may well succeed soon: the device was away, busy or locked, and not asked for what it does
+    /// not have.
+    pub(crate) fn may_pass(&self) -> bool {
+        match self {
+            Self::Exception { code, .. } => *code > ILLEGAL_DATA_VALUE,
+            Self::Short { .. } => false,
+            Self::Link(_) => true,
+        }
     }
 
     /// Whether the device was asked and said nothing, though nothing else is known to be wrong.
@@ -79,5 +91,12 @@ mod tests {
         assert!(!outage(Cause::Refused).is_no_news_after(&timeout()));
         assert!(refusal(2).is_illegal_address() && !refusal(3).is_illegal_address());
         assert!(refusal(2).device_answered() && !refusal(2).is_silence());
+    }
+
+    #[test]
+    fn what_the_device_does_not_have_does_not_pass() {
+        assert!(timeout().may_pass() && outage(Cause::Refused).may_pass());
+        assert!(refusal(6).may_pass() && refusal(10).may_pass());
+        assert!(!refusal(1).may_pass() && !refusal(2).may_pass() && !refusal(3).may_pass());
     }
 }

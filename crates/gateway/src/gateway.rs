@@ -13,7 +13,7 @@ use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use crate::device::Device;
 use crate::hub::Hub;
-use crate::poller::Poller;
+use crate::poller::{PolledWire, Poller};
 use crate::site::{Site, SiteWire};
 use crate::stop::{self, Announcer};
 use crate::{server, wires};
@@ -45,7 +45,7 @@ pub enum StartError {
         address: SocketAddr,
         /// The class of the system's error.
         kind: io::ErrorKind,
-        /// The system's own words.
+        /// Why not and what to do, or the system's own words.
         reason: String,
     },
     /// A wire that this build cannot speak.
@@ -88,7 +88,9 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     for (index, device) in site.devices.iter().enumerate() {
         let cost = wires::cost(&site.wires[device.wire].endpoint, device.profile);
         let link = wires::for_polling(&links[device.wire]);
-        tasks.spawn(Poller::new(Arc::clone(&hub), index, device.clone(), link, cost).run());
+        let shared = site.devices.iter().filter(|other| other.wire == device.wire).count() > 1;
+        let wire = PolledWire { link, cost, shared };
+        tasks.spawn(Poller::new(Arc::clone(&hub), index, device.clone(), wire).run());
     }
     tasks.spawn(age(Arc::clone(&hub)));
     tasks.spawn(server::serve(listener, address, hub));
@@ -120,7 +122,19 @@ async fn listen(address: SocketAddr) -> Result<TcpListener, StartError> {
 fn refused(address: SocketAddr, error: &io::Error) -> StartError {
     match error.kind() {
         io::ErrorKind::AddrInUse => StartError::AddressInUse { address },
-        kind => StartError::Listen { address, kind, reason: error.to_string() },
+        kind => {
+            let reason = match kind {
+                io::ErrorKind::PermissionDenied => {
+                    "this user may not use that port; choose one above 1023".to_owned()
+                }
+                io::ErrorKind::AddrNotAvailable => {
+                    "this machine does not have that address; write one of its own, or 0.0.0.0 for all of them"
+                        .to_owned()
+                }
+                _ => error.to_string(),
+            };
+            StartError::Listen { address, kind, reason }
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use axum::http::StatusCode;
 use busbar_link::Link;
-use busbar_profile::Rate;
+use busbar_profile::{Profile, Rate};
 use tokio::sync::broadcast;
 use tokio::time::Instant;
 
@@ -19,6 +19,7 @@ use crate::api::types::{
 use crate::api::{Problem, ValuesQuery};
 use crate::device::{Changes, Device, Round, points_view};
 use crate::events::{Event, frame};
+use crate::rates::Rates;
 use crate::stop::Stop;
 use crate::wires;
 
@@ -86,12 +87,13 @@ impl Hub {
 
     /// Takes over a finished round of a device and tells who listens.
     pub(crate) fn finish(&self, device: usize, round: Round) {
-        let (now, ts, rate) = (self.now(), wall_clock(), round.rate);
+        let (now, ts, rates) = (self.now(), wall_clock(), round.rates);
         let mut live = self.devices[device].lock();
         let (was_online, had_fault) = (live.device.is_online(), live.device.fault().map(str::to_owned));
         let changes = live.device.finish(round, now, ts);
         note(&live.device, was_online, had_fault.as_deref());
-        self.publish(device, &mut live, &[(rate, ts, changes)]);
+        let rounds = by_rate(rates, ts, changes, live.device.site().profile);
+        self.publish(device, &mut live, &rounds);
     }
 
     /// Marks what became too old on any device.
@@ -102,7 +104,7 @@ impl Hub {
             if expired.is_empty() {
                 continue;
             }
-            let at = |live: &Live, rate| live.device.last_read(rate).unwrap_or_else(wall_clock);
+            let at = |live: &Live, rate| live.device.last_round(rate).unwrap_or_else(wall_clock);
             let events: Vec<_> =
                 expired.into_iter().map(|(rate, changes)| (rate, at(&live, rate), changes)).collect();
             self.publish(index, &mut live, &events);
@@ -248,6 +250,21 @@ impl Hub {
     }
 }
 
+/// A round as its readers are told of it: once for each rate that was due. What came along goes with the first.
+fn by_rate(rates: Rates, ts: Time, changes: Changes, profile: &Profile) -> Vec<(Rate, Time, Changes)> {
+    let mut rounds: Vec<_> = rates.iter().map(|rate| (rate, ts, Changes::default())).collect();
+    for index in changes.values {
+        let own = rounds.iter().position(|(rate, ..)| *rate == profile.points[index].rate);
+        if let Some((.., of_rate)) = rounds.get_mut(own.unwrap_or(0)) {
+            of_rate.values.push(index);
+        }
+    }
+    if let Some((.., last)) = rounds.last_mut() {
+        (last.device, last.alarms) = (changes.device, changes.alarms);
+    }
+    rounds
+}
+
 fn bad_request(detail: String) -> Problem {
     Problem::new(StatusCode::BAD_REQUEST, detail)
 }
@@ -293,5 +310,29 @@ mod tests {
         assert_eq!(listed(&hub.alarms()), expected);
         assert_eq!(listed(&hub.snapshot(None).0.alarms), expected);
         assert_eq!(listed(&hub.snapshot(Some(0)).0.alarms), expected[1..2]);
+    }
+
+    #[tokio::test]
+    async fn a_round_of_two_rates_is_told_once_for_each() {
+        let hub = hub(&["gen1"], stop::channel().1);
+        let mut events = hub.subscribe();
+        let registers = [0, 1, 0, 0, 2302, 0, 215, 0, 1234, 0, 0, 0];
+        let both = Rates::from_iter([Rate::Fast, Rate::Slow]);
+        // Of the curve a part came along, which is none; the identity is whole.
+        hub.finish(0, answered(both, &[(100, &registers), (126, &[9, 0, 0, 0, 2])]));
+        let event = events.recv().await.unwrap();
+        let told: Vec<serde_json::Value> = std::str::from_utf8(&event.frames)
+            .unwrap()
+            .lines()
+            .filter_map(|line| serde_json::from_str(line.strip_prefix("data: ")?).ok())
+            .collect();
+        let changed = |told: &serde_json::Value| {
+            told["changed"].as_array().unwrap().iter().map(|v| v["id"].to_string()).collect::<Vec<_>>()
+        };
+        assert_eq!((&told[0]["rate"], &told[1]["rate"]), (&"fast".into(), &"slow".into()));
+        assert_eq!(told[0]["ts"], told[1]["ts"]);
+        assert_eq!(changed(&told[1]), ["\"hours\"", "\"starts\""]);
+        assert_eq!(changed(&told[0]).len(), 8, "seven fast points and what came along: {}", told[0]);
+        assert_eq!(told.len(), 3, "and the device once: {told:?}");
     }
 }

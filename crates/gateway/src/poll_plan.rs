@@ -3,139 +3,158 @@
 use std::time::Duration;
 
 use busbar_profile::plan::{Cost, Planner, Read};
-use busbar_profile::{Profile, Rate};
+use busbar_profile::{Point, Profile, Rate};
+
+use crate::rates::Rates;
 
 /// A point that the device refuses by itself is asked for again this long after, in case it changed its mind.
 const REST: Duration = Duration::from_secs(60);
 
-/// The rates that are polled; what is read on demand is not.
-pub(crate) const POLLED: [Rate; 3] = [Rate::Fast, Rate::Slow, Rate::Once];
-
-/// The reads of one device, by rate.
+/// The reads of one device, for whatever rates are due together.
 #[derive(Debug)]
 pub(crate) struct PollPlan {
     profile: &'static Profile,
     planner: Planner,
-    fast: RatePlan,
-    slow: RatePlan,
-    once: RatePlan,
-}
-
-#[derive(Debug, Default)]
-struct RatePlan {
-    /// Indexes of the readable points, in address order.
-    points: Vec<usize>,
-    reads: Vec<Read>,
+    /// What has been planned since the device last taught us something.
+    plans: Vec<(Rates, Vec<Read>)>,
     /// Reads that the device refuses however small they are, and when it last did.
     refused: Vec<(Read, Duration)>,
+    /// Reads that had no answer last time though the device answered others, the one that was tried longest ago first.
+    mute: Vec<Mute>,
+    /// Where a round begins.
+    first: u16,
+}
+
+/// A read without an answer.
+#[derive(Debug)]
+struct Mute {
+    read: Read,
+    /// How often in a row.
+    times: u32,
+    /// Not to be tried before this.
+    rests_until: Duration,
 }
 
 impl PollPlan {
     pub(crate) fn new(profile: &'static Profile, cost: Cost) -> Self {
-        let of = |rate| RatePlan { points: polled(profile, rate), ..RatePlan::default() };
-        let mut plan = Self {
-            profile,
-            planner: Planner::new(profile, cost),
-            fast: of(Rate::Fast),
-            slow: of(Rate::Slow),
-            once: of(Rate::Once),
-        };
-        plan.replan();
-        plan
+        let planner = Planner::new(profile, cost);
+        Self { profile, planner, plans: Vec::new(), refused: Vec::new(), mute: Vec::new(), first: 0 }
     }
 
-    /// The reads of a rate to send at `now`, in address order.
-    pub(crate) fn reads(&self, rate: Rate, now: Duration) -> Vec<Read> {
-        let Some(plan) = self.rate(rate) else { return Vec::new() };
-        let rests =
-            |read: &Read| plan.refused.iter().any(|(refused, at)| refused == read && now < *at + REST);
-        plan.reads.iter().filter(|read| !rests(read)).copied().collect()
+    /// The reads to send at `now` for all points of these rates together, in address order. Of those that had no answer
+    /// last time one comes along, at the end, so that it delays nothing.
+    pub(crate) fn reads(&mut self, rates: Rates, now: Duration) -> Vec<Read> {
+        let mut reads = self.plan(rates).to_vec();
+        reads.retain(|read| !self.refused.iter().any(|(refused, at)| refused == read && now < *at + REST));
+        let planned = reads.clone();
+        reads.retain(|read| !self.mute.iter().any(|mute| mute.read == *read));
+        let first = reads.partition_point(|read| read.address < self.first);
+        reads.rotate_left(first);
+        // One is enough: several in a row would make the wire believe that its connection is dead.
+        let awake = |mute: &&Mute| mute.rests_until <= now && planned.contains(&mute.read);
+        reads.extend(self.mute.iter().find(awake).map(|mute| mute.read));
+        reads
+    }
+
+    /// The device answered a read, if only to refuse it.
+    pub(crate) fn answered(&mut self, read: Read) {
+        self.mute.retain(|mute| mute.read != read);
+    }
+
+    /// The device answered others, but not this read: it is tried again ever more rarely.
+    pub(crate) fn unanswered(&mut self, read: Read, now: Duration) {
+        let known = self.mute.iter().position(|mute| mute.read == read);
+        let times = known.map_or(0, |index| self.mute.remove(index).times);
+        let rest = match times {
+            0 => Duration::ZERO,
+            times => Duration::from_secs(1 << times.min(6)).min(REST),
+        };
+        self.mute.push(Mute { read, times: times.saturating_add(1), rests_until: now + rest });
+    }
+
+    /// The device answered nothing from the start of a round up to `read`: the next one begins behind it, in case it is
+    /// only that part which never answers.
+    pub(crate) fn gave_up_at(&mut self, read: Read) {
+        self.first = read.address.saturating_add(read.count);
+    }
+
+    /// Whether a point of this rate is in a read that had no answer.
+    pub(crate) fn is_mute(&self, rate: Rate) -> bool {
+        self.mute.iter().any(|mute| self.serves(rate, mute.read))
     }
 
     /// Whether a rate has anything to read.
     pub(crate) fn has(&self, rate: Rate) -> bool {
-        self.rate(rate).is_some_and(|plan| !plan.reads.is_empty())
+        !self.planner.reads(self.wanted(rate.into())).is_empty()
+    }
+
+    /// Whether any of `read` was read for a point of this rate.
+    pub(crate) fn serves(&self, rate: Rate, read: Read) -> bool {
+        !self.items(rate.into(), read.address.into(), end(read)).is_empty()
     }
 
     /// The device knows none, or not all, of the addresses of `read`: the reads to send in its place. None when it
     /// cannot be split further; it then rests for a while.
-    pub(crate) fn refused(&mut self, rate: Rate, read: Read, now: Duration) -> Vec<Read> {
-        let items = self.items(rate, read);
+    pub(crate) fn refused(&mut self, rates: Rates, read: Read, now: Duration) -> Vec<Read> {
+        let items = self.items(rates, read.address.into(), end(read));
         let Some(middle) = middle(&items) else {
-            if let Some(plan) = self.rate_mut(rate) {
-                plan.refused.retain(|(other, _)| *other != read);
-                plan.refused.push((read, now));
-            }
+            self.refused.retain(|(other, at)| *other != read && now < *at + REST);
+            self.refused.push((read, now));
             return Vec::new();
         };
-        self.planner.split_at(middle);
-        self.replan();
+        self.split_at(middle);
         self.planner.reads(items)
     }
 
-    /// The device answered `read` with fewer registers than asked for: cuts off what holds no whole point, and gives
-    /// the reads to send for the rest. None when not even the first point is whole.
-    pub(crate) fn cut(&mut self, rate: Rate, read: Read, registers: &mut Vec<u16>) -> Vec<Read> {
-        let end = u32::from(read.address) + registers.len() as u32;
-        registers.truncate(self.whole(read, end));
-        let mut missing = self.items(rate, read);
-        missing.retain(|item| u32::from(item.0) + u32::from(item.1) > end);
-        match missing.first() {
-            Some((first, _)) if *first > read.address => {
-                self.planner.split_at(*first);
-                self.replan();
-                self.planner.reads(missing)
+    fn split_at(&mut self, address: u16) {
+        self.planner.split_at(address);
+        self.plans.clear();
+        self.mute.clear();
+    }
+
+    fn plan(&mut self, rates: Rates) -> &[Read] {
+        let place = self.plans.iter().position(|(planned, _)| *planned == rates).unwrap_or_else(|| {
+            self.plans.push((rates, self.planner.reads(self.wanted(rates))));
+            self.plans.len() - 1
+        });
+        &self.plans[place].1
+    }
+
+    /// Address and length of the points of these rates between two addresses, in address order; of what comes in
+    /// parts, the part that lies there.
+    fn items(&self, rates: Rates, from: u32, end: u32) -> Vec<(u16, u16)> {
+        let inside = |point: &Point| {
+            let (first, behind) =
+                (u32::from(point.address), u32::from(point.address) + u32::from(point.registers));
+            if !self.comes_in_parts(point) {
+                return (from <= first && behind <= end).then_some((point.address, point.registers));
             }
-            _ => Vec::new(),
-        }
+            let (first, behind) = (first.max(from), behind.min(end));
+            let length = u16::try_from(behind.checked_sub(first)?).ok()?;
+            (length > 0).then_some((u16::try_from(first).ok()?, length))
+        };
+        self.points(rates).filter_map(inside).collect()
     }
 
-    /// How many registers of an answer that goes up to `end` hold whole points: half a number is no number.
-    fn whole(&self, read: Read, end: u32) -> usize {
+    /// What all points of these rates need.
+    fn wanted(&self, rates: Rates) -> impl Iterator<Item = (u16, u16)> {
+        self.points(rates).map(|point| (point.address, point.registers))
+    }
+
+    fn points(&self, rates: Rates) -> impl Iterator<Item = &'static Point> + use<> {
         let points = self.profile.points.iter();
-        let halved = points
-            .filter(|point| point.address >= read.address && u32::from(point.address) < end)
-            .filter(|point| u32::from(point.address) + u32::from(point.registers) > end)
-            // What is longer than a read comes in parts anyway.
-            .filter(|point| point.registers <= self.profile.wire.max_read);
-        let whole = halved.map(|point| u32::from(point.address)).min().unwrap_or(end);
-        (whole - u32::from(read.address)) as usize
+        points.filter(move |point| rates.contains(point.rate) && point.access.is_readable())
     }
 
-    /// Address and length of the points of a rate that lie in `read`, in address order.
-    fn items(&self, rate: Rate, read: Read) -> Vec<(u16, u16)> {
-        let Some(plan) = self.rate(rate) else { return Vec::new() };
-        let points = plan.points.iter().map(|index| &self.profile.points[*index]);
-        points
-            .filter(|point| read.covers(point.address, point.registers))
-            .map(|point| (point.address, point.registers))
-            .collect()
+    /// What is longer than a read comes in parts.
+    fn comes_in_parts(&self, point: &Point) -> bool {
+        point.registers > self.profile.wire.max_read
     }
+}
 
-    fn replan(&mut self) {
-        for plan in [&mut self.fast, &mut self.slow, &mut self.once] {
-            let points = plan.points.iter().map(|index| &self.profile.points[*index]);
-            plan.reads = self.planner.reads(points.map(|point| (point.address, point.registers)));
-        }
-    }
-
-    fn rate(&self, rate: Rate) -> Option<&RatePlan> {
-        match rate {
-            Rate::Fast => Some(&self.fast),
-            Rate::Slow => Some(&self.slow),
-            Rate::Once => Some(&self.once),
-            Rate::OnDemand => None,
-        }
-    }
-
-    fn rate_mut(&mut self, rate: Rate) -> Option<&mut RatePlan> {
-        match rate {
-            Rate::Fast => Some(&mut self.fast),
-            Rate::Slow => Some(&mut self.slow),
-            Rate::Once => Some(&mut self.once),
-            Rate::OnDemand => None,
-        }
-    }
+/// The address behind a read.
+fn end(read: Read) -> u32 {
+    u32::from(read.address) + u32::from(read.count)
 }
 
 /// Indexes of the readable points of a rate.
@@ -175,14 +194,84 @@ mod tests {
 
     #[test]
     fn reads_each_rate_and_bridges_what_is_cheap() {
-        let plan = plan();
-        assert_eq!(spans(&plan.reads(Rate::Fast, at(0))), [(100, 12)]);
-        assert_eq!(spans(&plan.reads(Rate::Slow, at(0))), [(108, 2), (126, 2)]);
+        let mut plan = plan();
+        assert_eq!(spans(&plan.reads(Rate::Fast.into(), at(0))), [(100, 12)]);
+        assert_eq!(spans(&plan.reads(Rate::Slow.into(), at(0))), [(108, 2), (126, 2)]);
         // The curve is longer than a read.
-        let once = plan.reads(Rate::Once, at(0));
+        let once = plan.reads(Rate::Once.into(), at(0));
         assert!(once.iter().all(|read| read.count <= 16), "{once:?}");
         assert_eq!(once.iter().map(|read| read.count).sum::<u16>(), 21);
         assert!(!plan.has(Rate::OnDemand));
+    }
+
+    #[test]
+    fn rates_that_are_due_together_share_reads() {
+        let mut plan = plan();
+        // The hours lie between fast points.
+        let together = Rates::from_iter([Rate::Fast, Rate::Slow]);
+        assert_eq!(spans(&plan.reads(together, at(0))), [(100, 12), (126, 2)]);
+        let due = plan.planner.due(profile(), &[Rate::Fast, Rate::Slow]);
+        assert_eq!(plan.reads(together, at(0)), due.reads);
+    }
+
+    #[test]
+    fn what_one_rate_taught_holds_for_all() {
+        let mut plan = plan();
+        let fast = plan.reads(Rate::Fast.into(), at(0))[0];
+        let parts = plan.refused(Rate::Fast.into(), fast, at(0));
+        assert_eq!(spans(&parts), [(100, 3), (104, 8)]);
+        let together = Rates::from_iter([Rate::Fast, Rate::Slow]);
+        assert_eq!(spans(&plan.reads(together, at(1))), [(100, 3), (104, 8), (126, 2)]);
+    }
+
+    #[test]
+    fn a_shared_read_that_is_refused_costs_the_culprit_alone() {
+        // This device has no hours, which lie among fast points.
+        let refuses = |read: Read| read.covers(108, 1);
+        let mut plan = plan();
+        let together = Rates::from_iter([Rate::Fast, Rate::Slow]);
+        let mut waiting = plan.reads(together, at(0));
+        let mut answered = Vec::new();
+        while let Some(read) = waiting.pop() {
+            match refuses(read) {
+                true => waiting.extend(plan.refused(together, read, at(0))),
+                false => answered.push(read),
+            }
+        }
+        for address in [100, 101, 102, 104, 106, 110, 111, 126] {
+            assert!(answered.iter().any(|read| read.covers(address, 1)), "{address} was read");
+        }
+        for rates in [together, Rate::Fast.into(), Rate::Slow.into()] {
+            assert!(!plan.reads(rates, at(1)).into_iter().any(refuses), "{rates:?}");
+        }
+    }
+
+    #[test]
+    fn a_refused_part_of_a_long_point_does_not_hide_its_neighbour() {
+        // The identity lies before a curve that this device does not know.
+        let refuses = |read: Read| read.address + read.count > 131;
+        let mut plan = plan();
+        let mut waiting = plan.reads(Rate::Once.into(), at(0));
+        assert!(waiting[0].covers(130, 2), "{waiting:?}");
+        let mut answered = Vec::new();
+        while let Some(read) = waiting.pop() {
+            match refuses(read) {
+                true => waiting.extend(plan.refused(Rate::Once.into(), read, at(0))),
+                false => answered.push(read),
+            }
+        }
+        assert_eq!(spans(&answered), [(130, 1)]);
+        assert!(plan.reads(Rate::Once.into(), at(61)).iter().any(|read| spans(&[*read]) == [(130, 1)]));
+    }
+
+    #[test]
+    fn a_device_that_wants_pauses_gets_fewer_and_wider_reads() {
+        let cost = Cost::rtu(9600, 10, Duration::ZERO);
+        let smartgen = busbar_profile::builtin("smartgen-acc1700").unwrap();
+        let mut apart = PollPlan::new(smartgen, cost);
+        let mut wide = PollPlan::new(smartgen, cost.spaced(Duration::from_millis(500)));
+        let (apart, wide) = (apart.reads(Rate::Fast.into(), at(0)), wide.reads(Rate::Fast.into(), at(0)));
+        assert!(wide.len() < apart.len(), "{wide:?} and {apart:?}");
     }
 
     #[test]
@@ -192,11 +281,11 @@ mod tests {
         let refuses = |read: Read| read.covers(106, 1);
         let mut sent = 0;
         let mut answered = Vec::new();
-        let mut waiting = plan.reads(Rate::Fast, at(0));
+        let mut waiting = plan.reads(Rate::Fast.into(), at(0));
         while let Some(read) = waiting.pop() {
             sent += 1;
             match refuses(read) {
-                true => waiting.extend(plan.refused(Rate::Fast, read, at(0))),
+                true => waiting.extend(plan.refused(Rate::Fast.into(), read, at(0))),
                 false => answered.push(read),
             }
         }
@@ -206,9 +295,9 @@ mod tests {
         }
 
         // It is remembered: the next round meets no exception, and the culprit rests.
-        let next = plan.reads(Rate::Fast, at(1));
+        let next = plan.reads(Rate::Fast.into(), at(1));
         assert!(!next.iter().any(|read| refuses(*read)), "{next:?}");
-        let later = plan.reads(Rate::Fast, at(61));
+        let later = plan.reads(Rate::Fast.into(), at(61));
         assert_eq!(
             later.iter().filter(|read| refuses(**read)).map(|read| read.count).collect::<Vec<_>>(),
             [1]
@@ -216,38 +305,43 @@ mod tests {
     }
 
     #[test]
+    fn what_has_no_answer_comes_last_and_ever_more_rarely() {
+        let mut plan = plan();
+        let together = Rates::from_iter([Rate::Fast, Rate::Slow]);
+        let reads = plan.reads(together, at(0));
+        plan.unanswered(reads[0], at(0));
+        assert_eq!(plan.reads(together, at(0)), [reads[1], reads[0]]);
+        assert!(plan.is_mute(Rate::Fast) && !plan.is_mute(Rate::Once));
+        for (second, next) in [(1, 3), (3, 7), (7, 15), (15, 31), (31, 63), (63, 123), (123, 183)] {
+            plan.unanswered(reads[0], at(second));
+            assert_eq!(plan.reads(together, at(next - 1)), [reads[1]], "at {second} s");
+            assert_eq!(plan.reads(together, at(next)), [reads[1], reads[0]], "at {second} s");
+        }
+        plan.answered(reads[0]);
+        assert_eq!(plan.reads(together, at(124)), reads);
+
+        plan.unanswered(reads[1], at(124));
+        plan.unanswered(reads[0], at(124));
+        assert_eq!(plan.reads(together, at(124)), [reads[1]], "one of them at a time");
+        plan.unanswered(reads[1], at(124));
+        assert_eq!(plan.reads(together, at(124)), [reads[0]], "and then the other");
+    }
+
+    #[test]
+    fn a_round_begins_behind_what_made_the_last_one_give_up() {
+        let mut plan = plan();
+        let together = Rates::from_iter([Rate::Fast, Rate::Slow]);
+        let reads = plan.reads(together, at(0));
+        plan.gave_up_at(reads[0]);
+        assert_eq!(plan.reads(together, at(0)), [reads[1], reads[0]]);
+        plan.gave_up_at(reads[1]);
+        assert_eq!(plan.reads(together, at(0)), reads);
+    }
+
+    #[test]
     fn a_refused_single_point_cannot_be_split() {
         let mut plan = plan();
         let read = Read { function: 3, address: 104, count: 2 };
-        assert_eq!(plan.refused(Rate::Fast, read, at(0)), []);
-    }
-
-    #[test]
-    fn a_cut_answer_is_continued_at_the_first_point_that_is_not_whole() {
-        let mut plan = plan();
-        let read = plan.reads(Rate::Fast, at(0))[0];
-        // Half of the voltage at 104 came, but half a number is no number.
-        let mut registers = vec![1, 2, 3, 4, 5];
-        assert_eq!(spans(&plan.cut(Rate::Fast, read, &mut registers)), [(104, 8)]);
-        assert_eq!(registers, [1, 2, 3, 4]);
-        assert_eq!(spans(&plan.reads(Rate::Fast, at(1))), [(100, 3), (104, 8)]);
-    }
-
-    #[test]
-    fn a_cut_answer_without_a_whole_point_ends_there() {
-        let mut plan = plan();
-        let read = Read { function: 3, address: 104, count: 2 };
-        let mut registers = vec![1];
-        assert_eq!(plan.cut(Rate::Fast, read, &mut registers), []);
-        assert!(registers.is_empty());
-    }
-
-    #[test]
-    fn a_part_of_a_long_point_is_kept() {
-        let mut plan = plan();
-        let read = Read { function: 3, address: 131, count: 16 };
-        let mut registers = vec![7; 10];
-        assert_eq!(plan.cut(Rate::Once, read, &mut registers), []);
-        assert_eq!(registers, [7; 10]);
+        assert_eq!(plan.refused(Rate::Fast.into(), read, at(0)), []);
     }
 }

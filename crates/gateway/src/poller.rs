@@ -3,16 +3,18 @@
 use std::sync::Arc;
 
 use busbar_link::{Link, WireState};
-use busbar_profile::Rate;
 use busbar_profile::plan::{Cost, Read};
+use busbar_profile::{OverRead, Rate};
 use tokio::sync::watch;
 
 use crate::device::Round;
 use crate::failure::Failure;
 use crate::hub::Hub;
-use crate::poll_plan::{POLLED, PollPlan};
-use crate::schedule::Schedule;
+use crate::poll_plan::PollPlan;
+use crate::rates::{POLLED, Rates};
+use crate::schedule::{Pace, Schedule};
 use crate::site::SiteDevice;
+use crate::wires;
 
 /// So many reads in a row without an answer, each with its retries, and the device counts as silent.
 const SILENT_READS: u32 = 2;
@@ -26,17 +28,29 @@ pub(crate) struct Poller {
     link: Link,
     wire: watch::Receiver<WireState>,
     plan: PollPlan,
-    /// Where a round begins: behind the read that made the last one give up, so that a part of the device that
-    /// never answers does not hide the rest.
-    first: usize,
+    pace: Pace,
+    /// Whether there are other devices on the wire.
+    shared: bool,
     /// Whether the wire itself failed: then its return is worth a try at once.
     wire_failed: bool,
 }
 
+/// The wire of a device, as its poller sees it.
+pub(crate) struct PolledWire {
+    pub(crate) link: Link,
+    /// What a read costs on it.
+    pub(crate) cost: Cost,
+    /// Whether there are other devices on it.
+    pub(crate) shared: bool,
+}
+
 impl Poller {
-    pub(crate) fn new(hub: Arc<Hub>, device: usize, site: SiteDevice, link: Link, cost: Cost) -> Self {
+    pub(crate) fn new(hub: Arc<Hub>, device: usize, site: SiteDevice, wire: PolledWire) -> Self {
+        let PolledWire { link, cost, shared } = wire;
         let plan = PollPlan::new(site.profile, cost);
-        Self { hub, device, wire: link.state(), site, link, plan, first: 0, wire_failed: false }
+        let pace = Pace::new(wires::spacing(site.profile));
+        let link = link.with_short_answers(site.profile.wire.over_read == OverRead::Truncate);
+        Self { hub, device, wire: link.state(), site, link, plan, pace, shared, wire_failed: false }
     }
 
     pub(crate) async fn run(mut self) {
@@ -52,16 +66,21 @@ impl Poller {
         let mut schedule = Schedule::new(self.site.poll, self.hub.now());
         let mut answered = false;
         loop {
-            let rate = self.next(&mut schedule).await;
-            let rate = if schedule.is_silent() { probe } else { rate };
-            let round = self.round(rate, schedule.is_silent()).await;
+            let due = self.next(&mut schedule).await;
+            let rates = if schedule.is_silent() { probe.into() } else { due };
+            let began = self.hub.now();
+            let round = self.round(rates, schedule.is_silent()).await;
             match &round.silence {
                 Some(failure) => {
-                    schedule.silent(self.hub.now());
+                    let now = self.hub.now();
+                    schedule.silent(now, now.saturating_sub(began), self.shared);
                     self.wire_failed = !failure.is_silence();
                 }
                 None => {
-                    schedule.done(rate, self.hub.now());
+                    schedule.done(rates, self.hub.now());
+                    if rates.contains(Rate::Once) && self.missed(Rate::Once, &round) {
+                        schedule.missed_once();
+                    }
                     // Behind a connection that was made anew there may be another device.
                     if self.wire.has_changed().unwrap_or(false) && answered {
                         schedule.identify(self.hub.now());
@@ -74,16 +93,16 @@ impl Poller {
         }
     }
 
-    /// Waits for the next rate to be due. A silent device is worth a try as soon as its wire is up again.
-    async fn next(&mut self, schedule: &mut Schedule) -> Rate {
+    /// Waits for the next round to be due. A silent device is worth a try as soon as its wire is up again.
+    async fn next(&mut self, schedule: &mut Schedule) -> Rates {
         loop {
-            let (rate, at) = schedule.next();
-            let wait = at.saturating_sub(self.hub.now());
+            let now = self.hub.now();
+            let wait = schedule.next().saturating_sub(now);
             if wait.is_zero() {
-                return rate;
+                return schedule.due(now);
             }
             tokio::select! {
-                () = tokio::time::sleep(wait) => return rate,
+                () = tokio::time::sleep(wait) => {}
                 Ok(()) = self.wire.changed(), if self.wire_failed && schedule.is_silent() => {
                     if matches!(*self.wire.borrow_and_update(), WireState::Connected) {
                         schedule.probe(self.hub.now());
@@ -93,63 +112,70 @@ impl Poller {
         }
     }
 
-    /// Sends the reads of a rate, and those that the answers make necessary.
-    async fn round(&mut self, rate: Rate, probing: bool) -> Round {
-        let mut round = Round { rate, answers: Vec::new(), failures: Vec::new(), silence: None };
-        let mut reads = self.plan.reads(rate, self.hub.now());
-        let count = reads.len();
-        reads.rotate_left(self.first % count.max(1));
+    /// Whether points of a rate did not come for a reason that may pass.
+    fn missed(&self, rate: Rate, round: &Round) -> bool {
+        let mut failures = round.failures.iter().filter(|(_, failure)| failure.may_pass());
+        self.plan.is_mute(rate) || failures.any(|(read, _)| self.plan.serves(rate, *read))
+    }
+
+    /// Sends the reads of these rates together, and those that the answers make necessary.
+    async fn round(&mut self, rates: Rates, probing: bool) -> Round {
+        let mut round = Round { rates, answers: Vec::new(), failures: Vec::new(), silence: None };
+        let reads = self.plan.reads(rates, self.hub.now());
+        let mut mute = Vec::new();
         let mut unanswered = 0;
         for (sent, read) in reads.iter().enumerate() {
-            let Some(failure) = self.read(rate, *read, &mut round).await else {
+            let Some(failure) = self.read(rates, *read, &mut round).await else {
+                self.plan.answered(*read);
                 unanswered = 0;
                 continue;
             };
             unanswered += 1;
             let is_silence = failure.is_silence();
             round.failures.push((*read, failure.clone()));
-            if is_silence && unanswered < SILENT_READS && !probing && count > 1 {
+            if is_silence {
+                mute.push((*read, failure.clone()));
+            }
+            if is_silence && unanswered < SILENT_READS && !probing && reads.len() > 1 {
                 continue;
             }
-            // What comes behind is not worth its time-outs now, and comes first next time.
-            self.first = (self.first + sent + 1) % count;
+            // What comes behind is not worth its time-outs now.
             if is_silence && round.reached_the_device() {
                 round.failures.extend(reads[sent + 1..].iter().map(|read| (*read, failure.clone())));
             } else {
-                round.silence = Some(failure);
+                self.plan.gave_up_at(*read);
+                // The first silence says most: what followed may be the wire's being made anew for it.
+                let first = mute.first().filter(|_| is_silence).map(|(_, failure)| failure.clone());
+                round.silence = Some(first.unwrap_or(failure));
             }
             break;
+        }
+        if round.reached_the_device() && round.silence.is_none() {
+            mute.into_iter().for_each(|(read, _)| self.plan.unanswered(read, self.hub.now()));
         }
         round
     }
 
     /// One read of the plan, in smaller ones where the device wants it so. Gives back the failure when the device
     /// did not answer at all.
-    async fn read(&mut self, rate: Rate, read: Read, round: &mut Round) -> Option<Failure> {
+    async fn read(&mut self, rates: Rates, read: Read, round: &mut Round) -> Option<Failure> {
         let mut waiting = vec![read];
         while let Some(read) = waiting.pop() {
             let function = self.site.profile.wire.read_function();
+            tokio::time::sleep(self.pace.wait(self.hub.now())).await;
             let answer = self.link.read_registers(self.site.unit, function, read.address, read.count).await;
+            self.pace.done(self.hub.now());
             let failure = match answer {
-                Ok(mut registers) => {
-                    let got = registers.len();
-                    let rest = match got < usize::from(read.count) {
-                        true => self.plan.cut(rate, read, &mut registers),
-                        false => Vec::new(),
-                    };
-                    if !registers.is_empty() {
-                        round.answers.push((read.address, registers));
-                    }
-                    if got >= usize::from(read.count) || !rest.is_empty() {
-                        waiting.extend(rest.into_iter().rev());
-                        continue;
-                    }
-                    Failure::Short { got, wanted: read.count }
+                Ok(registers) if registers.len() == usize::from(read.count) => {
+                    round.answers.push((read.address, registers));
+                    continue;
                 }
+                // No read is longer than the device allows, so a shorter answer is a wrong one: who knows what of.
+                Ok(registers) => Failure::Short { got: registers.len(), wanted: read.count },
                 Err(error) => Failure::new(error, self.site.profile),
             };
             if failure.is_illegal_address() {
-                let parts = self.plan.refused(rate, read, self.hub.now());
+                let parts = self.plan.refused(rates, read, self.hub.now());
                 if !parts.is_empty() {
                     waiting.extend(parts.into_iter().rev());
                     continue;

@@ -4,10 +4,14 @@ use std::time::Duration;
 
 use busbar_profile::Rate;
 
+use crate::rates::Rates;
 use crate::site::Poll;
 
 /// A silent device is probed at least this often, so that its return is seen soon.
 const LONGEST_PAUSE: Duration = Duration::from_secs(10);
+
+/// The same where each probe costs others their time.
+const LONGEST_SHARED_PAUSE: Duration = Duration::from_secs(30);
 
 /// When each rate of a device is due.
 #[derive(Debug)]
@@ -17,6 +21,8 @@ pub(crate) struct Schedule {
     slow: Duration,
     /// None when it is done.
     once: Option<Duration>,
+    /// When it was last done.
+    identified: Option<Duration>,
     /// The next probe of a device that is silent, and how many it left unanswered.
     silent: Option<(Duration, u32)>,
 }
@@ -24,18 +30,22 @@ pub(crate) struct Schedule {
 impl Schedule {
     /// Everything is due at `now`.
     pub(crate) fn new(poll: Poll, now: Duration) -> Self {
-        Self { poll, fast: now, slow: now, once: Some(now), silent: None }
+        Self { poll, fast: now, slow: now, once: Some(now), identified: None, silent: None }
     }
 
-    /// What is due first, and when. Of what is due together, the rarer comes first: it is not put off by the rest.
-    pub(crate) fn next(&self) -> (Rate, Duration) {
-        if let Some((at, _)) = self.silent {
-            return (Rate::Fast, at);
+    /// When the next round begins. What is slow waits for the next fast round, so that they share reads.
+    pub(crate) fn next(&self) -> Duration {
+        match self.silent {
+            Some((at, _)) => at,
+            None => self.once.map_or(self.fast, |once| once.min(self.fast)),
         }
-        let candidates =
-            [(self.once, Rate::Once), (Some(self.slow), Rate::Slow), (Some(self.fast), Rate::Fast)];
-        let due = candidates.into_iter().filter_map(|(at, rate)| Some((at?, rate)));
-        due.min_by_key(|(at, _)| *at).map_or((Rate::Fast, self.fast), |(at, rate)| (rate, at))
+    }
+
+    /// All that a round at `now` is to read.
+    pub(crate) fn due(&self, now: Duration) -> Rates {
+        let rates = [(Some(self.fast), Rate::Fast), (Some(self.slow), Rate::Slow), (self.once, Rate::Once)];
+        let due = rates.into_iter().filter(|(at, _)| at.is_some_and(|at| at <= now));
+        due.map(|(_, rate)| rate).collect()
     }
 
     pub(crate) fn is_silent(&self) -> bool {
@@ -44,28 +54,41 @@ impl Schedule {
 
     /// A round is finished and the device answered. Rounds that should have begun meanwhile are left out, so that a
     /// slow wire is never owed anything.
-    pub(crate) fn done(&mut self, rate: Rate, now: Duration) {
+    pub(crate) fn done(&mut self, rates: Rates, now: Duration) {
         if self.silent.take().is_some() {
             // It was away: who knows what changed.
             *self = Self::new(self.poll, now);
         }
-        match rate {
-            Rate::Fast => self.fast = following(self.fast, self.poll.fast, now),
-            Rate::Slow => self.slow = following(self.slow, self.poll.slow, now),
-            Rate::Once | Rate::OnDemand => self.once = None,
+        for rate in rates.iter() {
+            match rate {
+                Rate::Fast => self.fast = following(self.fast, self.poll.fast, now),
+                Rate::Slow => self.slow = following(self.slow, self.poll.slow, now),
+                Rate::Once | Rate::OnDemand => (self.once, self.identified) = (None, Some(now)),
+            }
         }
     }
 
-    /// What is read once is to be read again.
-    pub(crate) fn identify(&mut self, now: Duration) {
-        self.once = Some(now);
+    /// What is read once did not come: it is tried again with the slow points.
+    pub(crate) fn missed_once(&mut self) {
+        self.once = Some(self.slow);
     }
 
-    /// The device did not answer: the next try comes after a pause that grows.
-    pub(crate) fn silent(&mut self, now: Duration) {
+    /// What is read once is to be read again, but no more often than what is slow: there are devices that close each
+    /// connection after one answer.
+    pub(crate) fn identify(&mut self, now: Duration) {
+        let earliest = self.identified.map_or(now, |identified| identified + self.poll.slow);
+        let at = now.max(earliest);
+        self.once = Some(self.once.map_or(at, |once| once.min(at)));
+    }
+
+    /// The device did not answer a round that took `took`: the next try comes after a pause that grows. On a wire that
+    /// others share its probes take a tenth of the time at most.
+    pub(crate) fn silent(&mut self, now: Duration, took: Duration, shared: bool) {
         let unanswered = self.silent.map_or(0, |(_, unanswered)| unanswered);
         let pause =
             self.poll.fast.saturating_mul(1 << unanswered.min(16)).min(LONGEST_PAUSE.max(self.poll.fast));
+        let least = if shared && unanswered > 0 { took.saturating_mul(9) } else { Duration::ZERO };
+        let pause = pause.max(least.min(LONGEST_SHARED_PAUSE));
         self.silent = Some((now + pause, unanswered.saturating_add(1)));
     }
 
@@ -74,6 +97,29 @@ impl Schedule {
         if let Some((at, _)) = &mut self.silent {
             *at = now;
         }
+    }
+}
+
+/// Keeps the pause that a device wants between the end of one exchange and the next, whatever others on the wire do.
+#[derive(Debug)]
+pub(crate) struct Pace {
+    pause: Duration,
+    earliest: Duration,
+}
+
+impl Pace {
+    pub(crate) fn new(pause: Duration) -> Self {
+        Self { pause, earliest: Duration::ZERO }
+    }
+
+    /// How long to wait before the next read.
+    pub(crate) fn wait(&self, now: Duration) -> Duration {
+        self.earliest.saturating_sub(now)
+    }
+
+    /// An exchange is over, answered or not.
+    pub(crate) fn done(&mut self, now: Duration) {
+        self.earliest = now + self.pause;
     }
 }
 
@@ -97,44 +143,85 @@ mod tests {
         Duration::from_millis(ms)
     }
 
+    fn rates<const N: usize>(rates: [Rate; N]) -> Rates {
+        Rates::from_iter(rates)
+    }
+
     /// Runs every round that is due until `end`; a round takes `takes`.
-    fn play(schedule: &mut Schedule, end: Duration, takes: Duration) -> Vec<(Rate, u64)> {
+    fn play(schedule: &mut Schedule, end: Duration, takes: Duration) -> Vec<(Rates, u64)> {
         let mut now = Duration::ZERO;
         let mut rounds = Vec::new();
         loop {
-            let (rate, due) = schedule.next();
-            now = now.max(due);
+            now = now.max(schedule.next());
             if now > end {
                 return rounds;
             }
-            rounds.push((rate, now.as_millis() as u64));
+            let due = schedule.due(now);
+            rounds.push((due, now.as_millis() as u64));
             now += takes;
-            schedule.done(rate, now);
+            schedule.done(due, now);
         }
     }
 
+    fn of(rounds: &[(Rates, u64)], rate: Rate) -> Vec<u64> {
+        rounds.iter().filter(|round| round.0.contains(rate)).map(|round| round.1).collect()
+    }
+
     #[test]
-    fn each_rate_has_its_beat() {
+    fn each_rate_has_its_beat_and_they_fall_together() {
         let mut schedule = Schedule::new(POLL, Duration::ZERO);
         let rounds = play(&mut schedule, ms(10_500), ms(10));
-        let of =
-            |rate| rounds.iter().filter(|round| round.0 == rate).map(|round| round.1).collect::<Vec<_>>();
-        assert_eq!(rounds[..3], [(Rate::Once, 0), (Rate::Slow, 10), (Rate::Fast, 20)]);
-        assert_eq!(of(Rate::Once), [0]);
-        assert_eq!(of(Rate::Slow), [10, 10_000]);
+        assert_eq!(rounds[0], (rates([Rate::Fast, Rate::Slow, Rate::Once]), 0));
+        assert_eq!(rounds[10], (rates([Rate::Fast, Rate::Slow]), 10_000));
+        assert_eq!(of(&rounds, Rate::Once), [0]);
+        assert_eq!(of(&rounds, Rate::Slow), [0, 10_000]);
         // The beat stays on the grid however long a round takes.
-        assert_eq!(of(Rate::Fast)[..3], [20, 1_000, 2_000]);
-        assert_eq!(of(Rate::Fast).len(), 11);
+        assert_eq!(of(&rounds, Rate::Fast)[..3], [0, 1_000, 2_000]);
+        assert_eq!(rounds.len(), 11, "no round is there for the slow points alone");
+    }
+
+    #[test]
+    fn a_slow_beat_that_is_no_multiple_of_the_fast_one_waits_for_it() {
+        let poll = Poll { fast: ms(1_000), slow: ms(2_500) };
+        let mut schedule = Schedule::new(poll, Duration::ZERO);
+        let rounds = play(&mut schedule, ms(10_500), ms(10));
+        assert_eq!(of(&rounds, Rate::Slow), [0, 3_000, 5_000, 8_000, 10_000]);
+        assert_eq!(rounds.len(), 11);
     }
 
     #[test]
     fn a_slow_wire_is_owed_nothing() {
         let mut schedule = Schedule::new(POLL, Duration::ZERO);
         let rounds = play(&mut schedule, ms(30_000), ms(2_500));
-        let slow = rounds.iter().filter(|round| round.0 == Rate::Slow).count();
-        let fast = rounds.iter().filter(|round| round.0 == Rate::Fast).count();
-        assert!(slow >= 3, "the slow rate is not starved: {rounds:?}");
-        assert!(fast >= 7, "and the fast one goes on: {rounds:?}");
+        assert!(of(&rounds, Rate::Slow).len() >= 3, "the slow rate is not starved: {rounds:?}");
+        assert!(of(&rounds, Rate::Fast).len() >= 10, "and the fast one goes on: {rounds:?}");
+    }
+
+    #[test]
+    fn a_new_identity_is_asked_for_at_once_and_a_missed_one_again() {
+        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        play(&mut schedule, ms(13_000), ms(1));
+        schedule.identify(ms(13_100));
+        assert_eq!((schedule.next(), schedule.due(ms(13_100))), (ms(13_100), rates([Rate::Once])));
+        schedule.done(rates([Rate::Once]), ms(13_200));
+        schedule.missed_once();
+        assert_eq!((schedule.next(), schedule.due(ms(14_000))), (ms(14_000), rates([Rate::Fast])));
+        assert_eq!(schedule.due(ms(20_000)), rates([Rate::Fast, Rate::Slow, Rate::Once]));
+    }
+
+    #[test]
+    fn a_connection_that_is_made_anew_all_the_time_causes_no_storm() {
+        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let (mut now, mut rounds) = (Duration::ZERO, Vec::new());
+        while now <= ms(30_000) {
+            let due = schedule.due(now);
+            rounds.push((due, now.as_millis() as u64));
+            now += ms(1);
+            schedule.done(due, now);
+            schedule.identify(now);
+            now = now.max(schedule.next());
+        }
+        assert!(of(&rounds, Rate::Once).len() <= 4 && rounds.len() <= 34, "{rounds:?}");
     }
 
     #[test]
@@ -143,8 +230,8 @@ mod tests {
         let mut now = Duration::ZERO;
         let mut pauses = Vec::new();
         for _ in 0..7 {
-            schedule.silent(now);
-            let (_, due) = schedule.next();
+            schedule.silent(now, ms(2_000), false);
+            let due = schedule.next();
             pauses.push((due - now).as_secs());
             now = due;
         }
@@ -153,20 +240,39 @@ mod tests {
 
         // The wire came up again: no reason to wait.
         schedule.probe(now - ms(500));
-        assert_eq!(schedule.next().1, now - ms(500));
+        assert_eq!(schedule.next(), now - ms(500));
+    }
+
+    #[test]
+    fn probes_on_a_shared_wire_leave_it_to_the_others() {
+        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        // It may have been a moment only.
+        schedule.silent(ms(4_000), ms(4_000), true);
+        assert_eq!(schedule.next(), ms(5_000));
+        schedule.silent(ms(7_000), ms(2_000), true);
+        assert_eq!(schedule.next(), ms(25_000));
+        schedule.silent(ms(30_000), ms(5_000), true);
+        assert_eq!(schedule.next(), ms(60_000), "its return is seen all the same");
     }
 
     #[test]
     fn after_silence_everything_is_read_again() {
         let mut schedule = Schedule::new(POLL, Duration::ZERO);
         play(&mut schedule, ms(3_000), ms(1));
-        schedule.silent(ms(3_100));
-        schedule.done(Rate::Fast, ms(5_000));
+        schedule.silent(ms(3_100), ms(100), false);
+        schedule.done(rates([Rate::Fast]), ms(5_000));
         assert!(!schedule.is_silent());
-        assert_eq!(schedule.next(), (Rate::Once, ms(5_000)));
-        schedule.done(Rate::Once, ms(5_010));
-        assert_eq!(schedule.next(), (Rate::Slow, ms(5_000)));
-        schedule.done(Rate::Slow, ms(5_020));
-        assert_eq!(schedule.next(), (Rate::Fast, ms(6_000)));
+        assert_eq!((schedule.next(), schedule.due(ms(5_000))), (ms(5_000), rates([Rate::Slow, Rate::Once])));
+        schedule.done(rates([Rate::Slow, Rate::Once]), ms(5_020));
+        assert_eq!((schedule.next(), schedule.due(ms(6_000))), (ms(6_000), rates([Rate::Fast])));
+        assert_eq!(schedule.due(ms(15_000)), rates([Rate::Fast, Rate::Slow]), "and they fall together again");
+    }
+
+    #[test]
+    fn a_pause_runs_from_the_end_of_an_exchange() {
+        let mut pace = Pace::new(ms(500));
+        assert_eq!(pace.wait(Duration::ZERO), Duration::ZERO);
+        pace.done(ms(100));
+        assert_eq!((pace.wait(ms(100)), pace.wait(ms(250)), pace.wait(ms(700))), (ms(500), ms(350), ms(0)));
     }
 }

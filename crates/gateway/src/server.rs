@@ -25,6 +25,7 @@ use tower_http::set_header::SetResponseHeaderLayer;
 use crate::api::{self, Problem};
 use crate::hub::Hub;
 use crate::page;
+use crate::patience::Patient;
 use crate::stop::Stop;
 
 /// How long connections may take to end: one that never reads ends by nothing else than being cut off.
@@ -33,12 +34,22 @@ pub(crate) const FAREWELL: Duration = Duration::from_secs(2);
 /// A client has this long to send the head of a request.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(10);
 
+/// Most connections at a time. The rest wait in the system's queue, and the wires always find a file handle.
+const MOST_CONNECTIONS: usize = 512;
+
 /// Nothing but our own files is loaded, and no other page may show ours.
 const POLICY: &str = "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; \
                       form-action 'self'; frame-ancestors 'none'";
 
+/// A reader that takes nothing for so long is gone, whatever its connection says.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(60);
+
 /// Serves until the gateway ends.
 pub(crate) async fn serve(listener: TcpListener, address: SocketAddr, hub: Arc<Hub>) {
+    serve_at_most(MOST_CONNECTIONS, listener, address, hub).await;
+}
+
+async fn serve_at_most(most: usize, listener: TcpListener, address: SocketAddr, hub: Arc<Hub>) {
     let stop = hub.stop();
     let router = router(hub, address);
     let mut connections = JoinSet::new();
@@ -48,7 +59,7 @@ pub(crate) async fn serve(listener: TcpListener, address: SocketAddr, hub: Arc<H
             biased;
             () = ended.requested() => break,
             Some(_) = connections.join_next() => {}
-            accepted = listener.accept() => match accepted {
+            accepted = listener.accept(), if connections.len() < most => match accepted {
                 Ok((stream, _)) => { connections.spawn(connection(stream, router.clone(), stop.clone())); }
                 Err(error) => {
                     // Out of file handles, most likely: it passes, and trying at once would only burn the processor.
@@ -68,7 +79,10 @@ async fn connection(stream: TcpStream, router: Router, mut stop: Stop) {
     let _ = stream.set_nodelay(true);
     let mut server = http1::Builder::new();
     server.timer(TokioTimer::new()).header_read_timeout(HEAD_TIMEOUT);
-    let connection = server.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router));
+    let connection = server.serve_connection(
+        TokioIo::new(Patient::new(stream, WRITE_TIMEOUT)),
+        TowerToHyperService::new(router),
+    );
     let mut connection = pin!(connection);
     let stopped = tokio::select! {
         result = connection.as_mut() => {
@@ -162,6 +176,7 @@ fn is_this_machine(host: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use axum::body::Body;
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
     use tower::ServiceExt;
 
     use super::*;
@@ -224,5 +239,33 @@ mod tests {
         assert_eq!(asked("http://evil.example/", Some("localhost")).as_deref(), Some("evil.example"));
         assert_eq!(asked("/", None), None);
         assert_eq!(asked("/", Some("a b")), None);
+    }
+
+    #[tokio::test]
+    async fn no_more_connections_than_allowed() {
+        let (announcer, stop) = crate::stop::channel();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let hub = Arc::new(crate::testing::hub(&[], stop));
+        let server = tokio::spawn(serve_at_most(1, listener, address, hub));
+        let ask = async || {
+            let mut stream = TcpStream::connect(address).await.unwrap();
+            let request = format!("GET /healthz HTTP/1.1\r\nhost: {address}\r\n\r\n");
+            stream.write_all(request.as_bytes()).await.unwrap();
+            stream
+        };
+        let mut answer = [0; 15];
+        let mut first = ask().await;
+        first.read_exact(&mut answer).await.unwrap();
+        assert_eq!(&answer, b"HTTP/1.1 200 OK");
+
+        let mut second = ask().await;
+        let soon = Duration::from_millis(50);
+        assert!(timeout(soon, second.read_exact(&mut answer)).await.is_err(), "it waits for a place");
+        drop(first);
+        second.read_exact(&mut answer).await.unwrap();
+        assert_eq!(&answer, b"HTTP/1.1 200 OK");
+        announcer.announce();
+        server.await.unwrap();
     }
 }

@@ -4,6 +4,7 @@ mod findings;
 mod reader;
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::ops::Range;
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -165,7 +166,7 @@ fn wires(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<(String, Opt
             table.required("endpoint", "\"tcp://192.168.1.20:502\"", findings, |table, key, findings| {
                 let text = table.string(key, findings)?;
                 match text.value.parse::<Endpoint>() {
-                    Ok(endpoint) => Some(endpoint),
+                    Ok(endpoint) => reachable(endpoint, text.span, &wires, findings),
                     Err(error) => {
                         // The link's sentences hold the remedy behind the semicolon.
                         let problem = error.problem.to_string();
@@ -182,6 +183,40 @@ fn wires(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<(String, Opt
         }
     }
     wires
+}
+
+/// An endpoint that something can listen on and that no other wire has: a controller takes one client, and only on one
+/// wire do requests keep out of each other's way.
+fn reachable(
+    endpoint: Endpoint,
+    span: Range<usize>,
+    wires: &[(String, Option<SiteWire>)],
+    findings: &mut Collector<'_>,
+) -> Option<Endpoint> {
+    if let Endpoint::Tcp { port: 0, .. } | Endpoint::RtuTcp { port: 0, .. } | Endpoint::Tls { port: 0, .. } =
+        endpoint
+    {
+        findings.add(
+            span,
+            format!("`{endpoint}` cannot be connected to: nothing listens on port 0"),
+            "write the port of the device, or leave it out for the usual one",
+        );
+        return None;
+    }
+    let same = |wire: &SiteWire| match (&wire.endpoint, &endpoint) {
+        // However the line is set, it is one line.
+        (Endpoint::Rtu { path, .. }, Endpoint::Rtu { path: other, .. }) => path == other,
+        (one, other) => one.to_string().eq_ignore_ascii_case(&other.to_string()),
+    };
+    if let Some((id, _)) = wires.iter().find(|wire| wire.1.as_ref().is_some_and(same)) {
+        findings.add(
+            span,
+            format!("`{endpoint}` is the endpoint of the wire `{id}` already"),
+            format!("put all devices that are reached through it on the wire `{id}`"),
+        );
+        return None;
+    }
+    Some(endpoint)
 }
 
 fn devices(

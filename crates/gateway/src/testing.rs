@@ -11,6 +11,7 @@ use crate::api::types::Time;
 use crate::device::{Device, Round};
 use crate::failure::Failure;
 use crate::hub::Hub;
+use crate::rates::Rates;
 use crate::site::{Poll, SiteDevice};
 use crate::stop::Stop;
 
@@ -128,20 +129,20 @@ pub(crate) fn device() -> Device {
 }
 
 /// A round in which these registers came and nothing failed.
-pub(crate) fn answered(rate: Rate, answers: &[(u16, &[u16])]) -> Round {
+pub(crate) fn answered(rates: impl Into<Rates>, answers: &[(u16, &[u16])]) -> Round {
     let answers = answers.iter().map(|(address, registers)| (*address, registers.to_vec())).collect();
-    Round { rate, answers, failures: Vec::new(), silence: None }
+    Round { rates: rates.into(), answers, failures: Vec::new(), silence: None }
 }
 
 /// A round in which one read failed.
-pub(crate) fn failed(rate: Rate, address: u16, count: u16, failure: Failure) -> Round {
+pub(crate) fn failed(rates: impl Into<Rates>, address: u16, count: u16, failure: Failure) -> Round {
     let read = Read { function: 3, address, count };
-    Round { rate, answers: Vec::new(), failures: vec![(read, failure)], silence: None }
+    Round { rates: rates.into(), answers: Vec::new(), failures: vec![(read, failure)], silence: None }
 }
 
 /// A round that the device left unanswered.
 pub(crate) fn silence() -> Round {
-    Round { rate: Rate::Fast, answers: Vec::new(), failures: Vec::new(), silence: Some(timeout()) }
+    Round { rates: Rate::Fast.into(), answers: Vec::new(), failures: Vec::new(), silence: Some(timeout()) }
 }
 
 pub(crate) fn timeout() -> Failure {

@@ -10,7 +10,7 @@ const VOLTS = point('volts', {
   name: 'Volts',
   unit: 'V',
   address: 10246,
-  plc: 50247,
+  plc: 410247,
   registers: 2,
   page: 11,
   doubt: 'sign',
@@ -115,7 +115,7 @@ test('address and number come on request, by a button', async () => {
   flushSync()
   expect(button.getAttribute('aria-expanded')).toBe('true')
   const details = text(document.getElementById(button.getAttribute('aria-controls')!))
-  for (const fact of ['10246 · 50247 · 2 registers', 'volts (u16)', '08FE 0000', 'page 11', 'sign']) {
+  for (const fact of ['10246 · 410247 · 2 registers', 'volts (u16)', '08FE 0000', 'page 11', 'sign']) {
     expect(details).toContain(fact)
   }
 })
@@ -133,6 +133,19 @@ test('alarms are listed by class and said politely', async () => {
   emit('alarms', { device: 'gen1', alarms: [alarm('gen1', 58, 'warning'), alarm('gen1', 54, 'shutdown')] })
   expect([...document.querySelectorAll('.alarms h4')].map(text)).toEqual(['Shutdown', 'Warning'])
   expect(text(document.querySelector('[aria-live="polite"]'))).toBe('Warning: Alarm 58. Shutdown: Alarm 54.')
+})
+
+test('no alarm is no news while an alarm word could not be read', async () => {
+  const fault = 'shutdown_alarms: the device answered exception 2 (illegal address)'
+  await show(snapshot([{ device: device('gen1', { alarms_fault: fault }), values: [] }]))
+  const list = document.querySelector('.alarms')!
+  expect(list.textContent).toContain('not known')
+  expect(list.textContent).not.toContain('none')
+  expect(list.textContent).toContain(fault)
+  emit('device', device('gen1'))
+  flushSync()
+  expect(list.textContent).toContain('none')
+  expect(list.textContent).not.toContain(fault)
 })
 
 test('a lost connection is told, and every value turns stale', async () => {

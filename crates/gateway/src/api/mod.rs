@@ -5,7 +5,7 @@ pub mod types;
 
 use std::sync::{Arc, LazyLock};
 
-use axum::extract::rejection::QueryRejection;
+use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -82,9 +82,9 @@ async fn devices(State(hub): State<Arc<Hub>>) -> Json<Vec<DeviceView>> {
 )]
 async fn device(
     State(hub): State<Arc<Hub>>,
-    Path(device): Path<String>,
+    device: Result<Path<String>, PathRejection>,
 ) -> Result<Json<DeviceView>, Problem> {
-    hub.device_view(&device).map(Json)
+    hub.device_view(&known(device)?).map(Json)
 }
 
 /// The points of one device: what there is to read. It does not change while the gateway runs.
@@ -98,9 +98,9 @@ async fn device(
 )]
 async fn points(
     State(hub): State<Arc<Hub>>,
-    Path(device): Path<String>,
+    device: Result<Path<String>, PathRejection>,
 ) -> Result<Json<PointsView>, Problem> {
-    hub.points(&device).map(Json)
+    hub.points(&known(device)?).map(Json)
 }
 
 /// Which values of a device are wanted.
@@ -130,11 +130,11 @@ pub(crate) struct ValuesQuery {
 )]
 async fn values(
     State(hub): State<Arc<Hub>>,
-    Path(device): Path<String>,
+    device: Result<Path<String>, PathRejection>,
     query: Result<Query<ValuesQuery>, QueryRejection>,
 ) -> Result<Json<Vec<ValueView>>, Problem> {
     let Query(query) = query.map_err(bad_query)?;
-    hub.values(&device, &query).map(Json)
+    hub.values(&known(device)?, &query).map(Json)
 }
 
 /// The active alarms of every device, the gravest first.
@@ -201,6 +201,23 @@ async fn healthz() -> &'static str {
     "ok\n"
 }
 
+/// The id in a path; one that is no text names no device.
+fn known(device: Result<Path<String>, PathRejection>) -> Result<String, Problem> {
+    match device {
+        Ok(Path(device)) => Ok(device),
+        Err(_) => {
+            let detail =
+                "the address is no UTF-8 text, so it names no device; /api/v1/devices lists the devices";
+            Err(Problem::new(StatusCode::BAD_REQUEST, detail))
+        }
+    }
+}
+
 fn bad_query(rejection: QueryRejection) -> Problem {
-    Problem::new(StatusCode::BAD_REQUEST, rejection.body_text())
+    let reason = rejection.body_text();
+    // Which field, and which there are; how it was found out is nobody's concern.
+    let reason = reason.strip_prefix("Failed to deserialize query string: ").unwrap_or(&reason);
+    let detail =
+        format!("the query is not understood: {reason}; /api/v1/openapi.json lists what it may hold");
+    Problem::new(StatusCode::BAD_REQUEST, detail)
 }

@@ -83,6 +83,9 @@ pub struct DeviceView {
     pub mode: Option<ModeView>,
     /// How many alarms of each class are active.
     pub alarms: AlarmCounts,
+    /// Why alarms and their counts are not to be relied on as they stand; null while all of them are read well.
+    #[schema(required, examples("shutdown_alarms: the device answered exception 2 (illegal address)"))]
+    pub alarms_fault: Option<String>,
     /// When it last answered; null before the first answer.
     #[schema(required)]
     pub last_seen: Option<Time>,
@@ -191,8 +194,8 @@ pub struct PointView {
     /// Its first register, as the manual prints it (and as it stands on the wire).
     #[schema(examples(10246))]
     pub address: u16,
-    /// The same register in the 4xxxx numbers of PLCs: 40001 + address.
-    #[schema(examples(50247))]
+    /// The same register in the 4xxxx numbers of PLCs: 40001 + address up to address 9998, 400001 + address above.
+    #[schema(examples(410_247))]
     pub plc: u32,
     /// How many registers it takes.
     #[schema(examples(2))]
@@ -423,6 +426,16 @@ pub struct WireStatistics {
     pub exceptions: Vec<ExceptionCount>,
     /// Answers that came after their time was up.
     pub late: u64,
+    /// Answers from another unit than the one that was asked.
+    pub wrong_unit: u64,
+    /// Answers with another function than the request.
+    pub wrong_function: u64,
+    /// Answers with more or less data than was asked for.
+    pub wrong_length: u64,
+    /// Confirmations of another write than was sent.
+    pub wrong_echo: u64,
+    /// Frames of another protocol than Modbus.
+    pub wrong_protocol: u64,
     /// Frames whose checksum was wrong.
     pub crc_errors: u64,
     /// Bytes that belonged to no frame.

@@ -160,7 +160,7 @@ fn a_device_that_refuses_everything_is_online_with_a_fault() {
     assert_eq!(
         view.fault.as_deref(),
         Some(
-            "Genset 1 answers, but refuses what it is asked: the device answered exception 4 (server device failure)"
+            "Genset 1 answers, but refuses what it is asked: the device answered exception 4 (server device failure); check that it is what its profile is for"
         )
     );
     let voltage = value(&device, "voltage");
@@ -295,4 +295,67 @@ fn a_round_in_which_nothing_was_asked_says_nothing() {
     device.finish(silence(), at(1), ts(1));
     assert_eq!(device.finish(answered(Rate::Fast, &[]), at(2), ts(2)), Changes::default());
     assert!(device.view().fault.is_some());
+}
+
+#[test]
+fn alarms_that_are_not_known_are_not_called_none() {
+    let mut device = device();
+    assert_eq!(device.view().alarms_fault.as_deref(), Some("shutdowns: not read yet"));
+
+    // It never had that array.
+    let mut round = answered(Rate::Fast, &[(100, &FAST[..10]), (111, &[0])]);
+    round.failures = failed(Rate::Fast, 110, 1, refusal(2)).failures;
+    device.finish(round, at(0), ts(0));
+    let view = device.view();
+    assert!(view.online && view.fault.is_none());
+    assert_eq!(
+        view.alarms_fault.as_deref(),
+        Some("shutdowns: the device answered exception 2 (illegal data address)")
+    );
+
+    assert!(device.finish(answered(Rate::Fast, &[(100, &FAST)]), at(1), ts(1)).device);
+    assert_eq!(device.view().alarms_fault, None);
+
+    // It had one, and lost it while an alarm was active.
+    device.finish(answered(Rate::Fast, &[(100, &with(&[(11, 1)]))]), at(2), ts(2));
+    let changes = device.finish(failed(Rate::Fast, 111, 1, timeout()), at(3), ts(3));
+    assert!(changes.device || device.view().alarms_fault.is_some());
+    let view = device.view();
+    assert_eq!(view.alarms.warning, 1, "nobody said that it is over");
+    assert!(view.alarms_fault.is_some_and(|fault| fault.starts_with("warnings: ")));
+}
+
+#[test]
+fn alarms_grow_old_too() {
+    let mut device = running();
+    assert!(device.expire(at(6))[0].1.device);
+    assert_eq!(device.view().alarms_fault.as_deref(), Some("shutdowns: not read for too long"));
+}
+
+#[test]
+fn a_round_of_two_rates_fails_the_points_of_both() {
+    let mut device = running();
+    let both = crate::rates::Rates::from_iter([Rate::Fast, Rate::Slow]);
+    let mut round = answered(both, &[(126, &[9, 0])]);
+    round.failures = failed(both, 100, 12, refusal(4)).failures;
+    let changes = device.finish(round, at(1), ts(1));
+    assert!(changed(&changes).contains(&"hours") && changed(&changes).contains(&"voltage"));
+    assert_eq!(
+        (value(&device, "hours").quality, value(&device, "starts").quality),
+        (Shown::Bad, Shown::Good)
+    );
+    assert_eq!(value(&device, "starts").ts, Some(ts(1)));
+    assert_eq!((device.last_round(Rate::Slow), device.last_round(Rate::Once)), (Some(ts(1)), Some(ts(0))));
+}
+
+#[test]
+fn what_comes_along_is_read_but_its_absence_is_no_failure() {
+    let mut device = running();
+    device.finish(answered(Rate::Fast, &[(100, &with(&[(8, 2000)]))]), at(1), ts(1));
+    let hours = value(&device, "hours");
+    assert_eq!((hours.value, hours.ts), (number(20.0), Some(ts(1))));
+    assert_eq!(device.last_round(Rate::Slow), Some(ts(0)), "that was no round of the slow points");
+
+    device.finish(failed(Rate::Fast, 100, 12, refusal(4)), at(2), ts(2));
+    assert_eq!(value(&device, "hours").quality, Shown::Good, "it was not due");
 }

@@ -148,6 +148,22 @@ fn every_mistake_has_its_place_and_remedy() {
             "site.toml:6:6: there is a wire `w` already; give every wire an id of its own",
         ),
         (
+            &with("[[wires]]\nid = \"w\"\nendpoint = \"tcp://h:0\""),
+            "site.toml:4:12: `tcp://h:0` cannot be connected to: nothing listens on port 0; write the port of the device",
+        ),
+        (
+            &with(
+                "[[wires]]\nid = \"w\"\nendpoint = \"tcp://h\"\n[[wires]]\nid = \"x\"\nendpoint = \"tcp://H:502\"",
+            ),
+            "site.toml:7:12: `tcp://H:502` is the endpoint of the wire `w` already; put all devices",
+        ),
+        (
+            &with(
+                "[[wires]]\nid = \"w\"\nendpoint = \"rtu:///dev/a?baud=9600\"\n[[wires]]\nid = \"x\"\nendpoint = \"rtu:///dev/a?baud=19200\"",
+            ),
+            "site.toml:7:12: `rtu:///dev/a?baud=19200",
+        ),
+        (
             &device_with("profile", "profile = \"datakom-x\""),
             "site.toml:7:11: there is no profile `datakom-x`; write one of: datakom-d",
         ),

@@ -82,6 +82,8 @@ async fn a_part_that_never_answers_does_not_hide_the_rest() {
     for point in ["warning_alarms", "unit_mode", "longitude"] {
         bench.until_value(point, is_good).await;
     }
+    // The connection has proved good.
+    until(async || bench.device.change(|device| device.reads.len()), |reads| *reads > 150).await;
     let mut stream = bench.client.events("").await;
     // All three alarm arrays, which are three reads in a row.
     bench.device.change(|device| device.mute = Some(10_504..=10_551));
@@ -89,10 +91,14 @@ async fn a_part_that_never_answers_does_not_hide_the_rest() {
         let changed = event.data["changed"].as_array();
         changed.is_some_and(|changed| changed.iter().any(|v| v["id"] == point && v["quality"] == quality))
     };
-    // The round that met them gave up, and says so of what it did not come to.
-    let round = stream.until(|event| changed(event, "shutdown_alarms", "bad")).await;
-    assert!(changed(&round, "unit_mode", "bad"), "{round:?}");
+    // A round that met two of them gave up, and says so of what it did not come to.
+    stream.until(|event| changed(event, "unit_mode", "bad")).await;
     stream.until(|event| changed(event, "unit_mode", "good")).await;
+    for point in ["shutdown_alarms", "load_dump_alarms", "warning_alarms"] {
+        bench.until_value(point, is_bad).await;
+    }
+    let mut stream = bench.client.events("").await;
+    stream.next().await.unwrap();
     // From then on they come last and cost nobody anything.
     for _ in 0..3 {
         let round = stream.until(|event| event.name == "values" && event.data["rate"] == "fast").await;
@@ -105,20 +111,48 @@ async fn a_part_that_never_answers_does_not_hide_the_rest() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_device_that_cuts_its_answers_is_still_read_whole() {
+async fn a_short_answer_is_no_value() {
     let bench = Bench::with(|device| device.cut = Some(5)).await;
-    let voltage = bench.until_value("genset_l1_voltage", is_good).await;
-    assert_eq!(voltage["value"], json!(230.2));
-    bench.until_value("genset_l3_voltage", is_good).await;
-    // No register moved to a neighbour's place, and none was made up.
-    let values = bench.client.get("/api/v1/devices/gen1/values?group=genset").await.json();
-    for value in values.as_array().unwrap() {
-        let raw = value["raw"].as_array().map(|raw| raw.iter().any(|register| register != 0));
-        assert_eq!(raw.unwrap_or(false), value["id"] == "genset_l1_voltage", "{value}");
+    // Nobody asked for more than the device allows, so nobody knows what these registers are.
+    for point in ["genset_l1_voltage", "genset_l3_voltage", "shutdown_alarms"] {
+        let value = bench.until_value(point, is_bad).await;
+        assert_eq!((&value["value"], &value["ts"]), (&json!(null), &json!(null)), "{value}");
     }
-    // Sixteen registers of alarms do not come out of five, so nothing is said about them.
-    let alarms = bench.until_value("shutdown_alarms", is_bad).await;
-    assert_eq!(alarms["error"], "the device answered only 5 of 16 registers");
+    let view = bench.view().await;
+    assert!(view["alarms_fault"].is_string(), "{view}");
+    // It was a passing fault: nothing of it stays in the plan.
+    bench.device.change(|device| device.cut = None);
+    bench.until_value("genset_l1_voltage", is_good).await;
+    bench.until_value("longitude", is_good).await;
+    bench.until_value("shutdown_alarms", is_good).await;
+    bench.device.change(|device| device.reads.clear());
+    let reads =
+        until(async || bench.device.change(|device| device.reads.clone()), |reads| reads.len() > 50).await;
+    assert!(reads.contains(&(10_240, 16)), "{reads:?}");
+    assert_eq!(bench.view().await["alarms_fault"], json!(null));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn alarms_that_cannot_be_read_are_not_called_none() {
+    let bench = Bench::with(|device| device.unknown = Some(10_504..=10_535)).await;
+    bench.until_value("shutdown_alarms", is_bad).await;
+    let view = bench.view().await;
+    assert_eq!((&view["online"], &view["alarms"]["shutdown"]), (&json!(true), &json!(0)));
+    assert_eq!(view["alarms_fault"], "shutdown_alarms: the device answered exception 2 (illegal address)");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_connection_that_drops_again_and_again_causes_no_storm() {
+    let device = Imitation::start().await;
+    device.change(|device| device.answers = Some(110));
+    let rarely = site(&format!("tcp://{}", device.address())).replace("slow = \"200ms\"", "slow = \"1h\"");
+    let (_gateway, client) = start(&rarely).await;
+    let wire = async || client.get("/api/v1/wires").await.json()[0]["statistics"].clone();
+    let many = |statistics: &Value| statistics["reconnects"].as_u64().is_some_and(|count| count > 4);
+    until(wire, many).await;
+    // What is read once is read with the first round, and again when an hour is over.
+    let reads = device.change(|device| device.reads.clone());
+    assert_eq!(reads.iter().filter(|read| read.0 == 11_693).count(), 1, "{reads:?}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -133,7 +167,9 @@ async fn answers_that_are_not_ours_change_nothing() {
     let first = stream.next().await.unwrap();
     assert!(!first.data.to_string().contains("61166"));
     let statistics = bench.client.get("/api/v1/wires").await.json()[0]["statistics"].clone();
-    assert!(statistics["late"].as_u64().unwrap() > 0, "{statistics}");
+    for counter in ["late", "wrong_unit", "wrong_function", "wrong_length"] {
+        assert!(statistics[counter].as_u64().unwrap() > 0, "{counter}: {statistics}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -230,4 +266,30 @@ async fn one_faulty_wire_leaves_the_others_alone() {
     let view = async || client.get("/api/v1/devices").await.json();
     let views = until(view, |views| views[0]["online"] == true && views[1]["fault"] != json!(null)).await;
     assert_eq!((&views[0]["fault"], &views[1]["online"]), (&json!(null), &json!(false)));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn silent_units_do_not_starve_the_one_that_answers() {
+    let device = Imitation::start().await;
+    device.change(|device| device.absent = vec![2, 3, 4]);
+    let mut text = site(&format!("tcp://{}", device.address()));
+    let table = text.split_once("[[devices]]").unwrap().1.to_owned();
+    for unit in 2..=4 {
+        let table =
+            table.replace("gen1", &format!("gen{unit}")).replace("unit = 1", &format!("unit = {unit}"));
+        text.push_str(&format!("\n[[devices]]{table}"));
+    }
+    let (_gateway, client) = start(&text).await;
+    let view = async |id: &str| client.get(&format!("/api/v1/devices/{id}")).await.json();
+    until(async || view("gen1").await, |view| view["online"] == true).await;
+    for id in ["gen2", "gen3", "gen4"] {
+        until(async || view(id).await, |view| view["fault"] != json!(null)).await;
+    }
+    let mut stream = client.events("?device=gen1").await;
+    for _ in 0..20 {
+        let round = stream.until(|event| event.name == "values" && event.data["rate"] == "fast").await;
+        let bad = round.data["changed"].as_array().unwrap().iter().find(|value| !is_good(value));
+        assert_eq!(bad, None);
+    }
+    assert_eq!(view("gen1").await["online"], true);
 }

@@ -38,7 +38,7 @@ async fn a_bad_query_is_told_in_a_sentence() {
     for (query, expected) in [
         ("?group=gen", "gen1 has no group gen; it has state, alarms, "),
         ("?point=genset_l1_voltage,speed", "gen1 has no point speed; see /api/v1/devices/gen1/points"),
-        ("?points=engine_speed", "Failed to deserialize query string: points: unknown field `points`"),
+        ("?points=engine_speed", "the query is not understood: points: unknown field `points`"),
     ] {
         let problem = bench.client.get(&format!("{values}{query}")).await.problem(400);
         assert!(problem.starts_with(expected), "{query}: {problem}");
@@ -141,4 +141,16 @@ async fn the_document_is_served() {
         serde_json::from_str(&busbar_gateway::openapi().to_json().unwrap()).unwrap();
     assert!(served == generated);
     assert_eq!(served["openapi"], "3.1.0");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_address_that_is_no_text_is_a_problem_like_any_other() {
+    let bench = Bench::new().await;
+    for path in ["/api/v1/devices/%FF", "/api/v1/devices/%FF/points", "/api/v1/devices/%FF/values"] {
+        let problem = bench.client.get(path).await.problem(400);
+        assert!(problem.contains("names no device"), "{path}: {problem}");
+    }
+    let problem = bench.client.get("/api/v1/devices/gen1/values?foo=1").await.problem(400);
+    assert!(problem.starts_with("the query is not understood: ") && problem.contains("foo"), "{problem}");
+    assert!(!problem.contains("deserialize"), "{problem}");
 }

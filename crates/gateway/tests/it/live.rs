@@ -104,4 +104,7 @@ async fn the_wire_counts() {
     let statistics = &wire["statistics"];
     assert!(statistics["answers"].as_u64().unwrap() > 0 && statistics["latency_ms"].as_f64().unwrap() > 0.0);
     assert_eq!(statistics["exceptions"], json!([]));
+    for counter in ["wrong_unit", "wrong_function", "wrong_length", "wrong_echo", "wrong_protocol"] {
+        assert_eq!(statistics[counter], 0, "{counter}");
+    }
 }

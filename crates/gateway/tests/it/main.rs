@@ -8,5 +8,6 @@ mod faults;
 mod http;
 mod live;
 mod openapi;
+mod sharing;
 mod start;
 mod support;

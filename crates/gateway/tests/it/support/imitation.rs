@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::ops::RangeInclusive;
 use std::sync::{Arc, Mutex};
+use std::time::Instant;
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
@@ -17,6 +18,8 @@ pub(crate) struct Behaviour {
     pub(crate) registers: BTreeMap<u16, u16>,
     /// Says nothing at all.
     pub(crate) silent: bool,
+    /// Units that are not there.
+    pub(crate) absent: Vec<u8>,
     /// Says nothing to a read of any of these.
     pub(crate) mute: Option<RangeInclusive<u16>>,
     /// Answers every read with this exception.
@@ -31,6 +34,10 @@ pub(crate) struct Behaviour {
     pub(crate) garbage: bool,
     /// Hangs up after the next answer, once.
     pub(crate) hang_up: bool,
+    /// Hangs up after each so many answers.
+    pub(crate) answers: Option<usize>,
+    /// Every read so far: when it came, and to which unit.
+    pub(crate) times: Vec<(Instant, u8)>,
     /// Every read so far: address and count.
     pub(crate) reads: Vec<(u16, u16)>,
 }
@@ -101,7 +108,10 @@ async fn connection(mut stream: TcpStream, behaviour: Arc<Mutex<Behaviour>>) {
             return;
         }
         let mut behaviour = behaviour.lock().unwrap();
-        if std::mem::take(&mut behaviour.hang_up) || behaviour.garbage {
+        if std::mem::take(&mut behaviour.hang_up)
+            || behaviour.garbage
+            || behaviour.answers.is_some_and(|answers| behaviour.reads.len().is_multiple_of(answers))
+        {
             return;
         }
     }
@@ -112,8 +122,10 @@ fn answer(device: &mut Behaviour, request: &[u8; 12]) -> Option<Vec<u8>> {
     let address = u16::from_be_bytes([request[8], request[9]]);
     let count = u16::from_be_bytes([request[10], request[11]]);
     assert_eq!((&request[2..6], request[7]), (&[0, 0, 0, 6][..], 3), "only reads are expected");
+    assert!(count <= 125, "a read of {count}");
     device.reads.push((address, count));
-    if device.silent {
+    device.times.push((Instant::now(), request[6]));
+    if device.silent || device.absent.contains(&request[6]) {
         return None;
     }
     if device.garbage {
@@ -129,7 +141,7 @@ fn answer(device: &mut Behaviour, request: &[u8; 12]) -> Option<Vec<u8>> {
     if let Some(code) = device.exception.or(unknown.then_some(2)) {
         return Some(frame(request, request[6], &[0x83, code]));
     }
-    let sent = count.min(device.cut.unwrap_or(16));
+    let sent = count.min(device.cut.unwrap_or(125));
     let mut pdu = vec![3, (sent * 2) as u8];
     for register in address..address + sent {
         pdu.extend(device.registers.get(&register).copied().unwrap_or(0).to_be_bytes());

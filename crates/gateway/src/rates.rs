@@ -1,0 +1,53 @@
+//! Which rates are read together.
+
+use busbar_profile::Rate;
+
+/// The rates that are polled; what is read on demand is not.
+pub(crate) const POLLED: [Rate; 3] = [Rate::Fast, Rate::Slow, Rate::Once];
+
+/// A set of polled rates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Rates([bool; POLLED.len()]);
+
+impl Rates {
+    pub(crate) fn contains(self, rate: Rate) -> bool {
+        self.iter().any(|other| other == rate)
+    }
+
+    /// The most frequent first.
+    pub(crate) fn iter(self) -> impl Iterator<Item = Rate> {
+        POLLED.into_iter().zip(self.0).filter_map(|(rate, contained)| contained.then_some(rate))
+    }
+}
+
+impl FromIterator<Rate> for Rates {
+    /// What is not polled is left out.
+    fn from_iter<I: IntoIterator<Item = Rate>>(rates: I) -> Self {
+        let mut set = Self::default();
+        for rate in rates {
+            for (polled, contained) in POLLED.iter().zip(&mut set.0) {
+                *contained |= *polled == rate;
+            }
+        }
+        set
+    }
+}
+
+impl From<Rate> for Rates {
+    fn from(rate: Rate) -> Self {
+        Self::from_iter([rate])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_of_rates() {
+        let rates = Rates::from_iter([Rate::Once, Rate::Fast, Rate::OnDemand, Rate::Fast]);
+        assert_eq!(rates.iter().collect::<Vec<_>>(), [Rate::Fast, Rate::Once]);
+        assert!(rates.contains(Rate::Once) && !rates.contains(Rate::Slow) && !rates.contains(Rate::OnDemand));
+        assert_eq!(Rates::from(Rate::OnDemand), Rates::default());
+    }
+}
