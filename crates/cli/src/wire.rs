@@ -3,12 +3,14 @@
 use std::time::Duration;
 
 use busbar_link::{Direction, Endpoint, Link, LinkError, Options, Trace};
-use busbar_profile::{Profile, plan::Cost};
+use busbar_profile::{OverRead, Profile, plan::Cost};
 use jiff::{SignedDuration, Timestamp};
 
 use crate::{args, failure::Failure, terminal};
 
 /// Opens the wire. What the command line leaves open, the profile says; without one the defaults of the link hold.
+///
+/// Answers may be short where the profile says that the device cuts long reads, and where no profile tells.
 pub(crate) fn open(
     endpoint: &Endpoint,
     args: &args::Wire,
@@ -28,7 +30,8 @@ pub(crate) fn open(
         trace: args.trace.then(trace),
         ..defaults
     };
-    Link::open(endpoint.clone(), options).map_err(Failure::failed)
+    let short = profile.is_none_or(|profile| profile.wire.over_read == OverRead::Truncate);
+    Ok(Link::open(endpoint.clone(), options).map_err(Failure::failed)?.with_short_answers(short))
 }
 
 /// What a read costs on this wire. Networks are taken for slow ones: there a request costs more than some bytes.

@@ -109,7 +109,7 @@ fn table(
         let brought: Vec<&Point> = points
             .iter()
             .filter_map(|index| profile.points.get(*index))
-            .filter(|point| point.address < read.address + read.count && point.last() >= read.address)
+            .filter(|point| point.address <= read.address + (read.count - 1) && point.last() >= read.address)
             .collect();
         let brings = match brought.as_slice() {
             [] => String::new(),

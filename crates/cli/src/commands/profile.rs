@@ -1,7 +1,8 @@
 //! `busbar profile`: the profiles, listed, shown, checked.
 
 use busbar_profile::{
-    OverRead, Point, Profile, builtins,
+    OverRead, Profile, builtins,
+    page::scale,
     show::{ProfileShow, ProfileSummary},
 };
 use serde::Serialize;
@@ -176,7 +177,7 @@ fn points(profile: &Profile, style: Style) -> String {
                 Cell::dim(point.plc_number().to_string()),
                 format!("{}{doubt}", point.name).into(),
                 point.data_type.to_string().into(),
-                scale(point).into(),
+                point.scale.map(scale).unwrap_or_default().into(),
                 point.unit.as_deref().map(people::unit).unwrap_or_default().into(),
                 point.access.to_string().into(),
                 Cell::dim(point.id.as_str()),
@@ -188,27 +189,6 @@ fn points(profile: &Profile, style: Style) -> String {
     let note =
         if doubts.is_empty() { "" } else { "\n?  the manual leaves something open here; --json says what\n" };
     table.render(style, terminal::width()) + note
-}
-
-/// How a raw number becomes a value.
-fn scale(point: &Point) -> String {
-    let Some(scale) = point.scale else { return String::new() };
-    let factor = match (scale.num(), scale.den()) {
-        (1, 1) => String::new(),
-        (1, den) => format!("/ {den}"),
-        (num, 1) => format!("x {num}"),
-        (num, den) => format!("x {num} / {den}"),
-    };
-    match scale.offset().to_string().as_str() {
-        "0" if factor.is_empty() => "1".to_owned(),
-        "0" => factor,
-        offset => format!(
-            "{factor} {}",
-            offset.strip_prefix('-').map_or(format!("+ {offset}"), |o| format!("- {o}"))
-        )
-        .trim_start()
-        .to_owned(),
-    }
 }
 
 /// Codes or bits with their labels, and the points that share them.

@@ -64,7 +64,7 @@ fn remedy(error: &LinkError) -> &'static str {
 
 fn table(args: &args::Registers, registers: &[u16]) -> String {
     let order = args.wire.word_order.unwrap_or(WordOrder::LowFirst);
-    let (area, title) = if args.function == 4 { (30_001, "3XXXX") } else { (40_001, "4XXXX") };
+    let (area, title) = if args.function == 4 { (3, "3XXXX") } else { (4, "4XXXX") };
     let mut table = Table::new([
         ("ADDRESS", Align::Right),
         (title, Align::Right),
@@ -75,6 +75,8 @@ fn table(args: &args::Registers, registers: &[u16]) -> String {
     ]);
     for (offset, register) in registers.iter().enumerate() {
         let address = usize::from(args.address) + offset;
+        // Five digits end at address 9998.
+        let first = if address <= 9998 { area * 10_000 + 1 } else { area * 100_000 + 1 };
         // Pairs from the first register on: where 32-bit values begin, only the manual knows.
         let pair = match (offset % 2, registers.get(offset + 1)) {
             (0, Some(next)) => {
@@ -86,7 +88,7 @@ fn table(args: &args::Registers, registers: &[u16]) -> String {
         };
         table.row([
             address.to_string().into(),
-            Cell::dim((area + address).to_string()),
+            Cell::dim((first + address).to_string()),
             format!("{register:04X}").into(),
             register.to_string().into(),
             register.cast_signed().to_string().into(),

@@ -5,8 +5,10 @@
 
 mod decode;
 mod frame;
+mod guide;
 mod help;
 mod peer;
+mod plan;
 mod profile;
 mod services;
 mod support;

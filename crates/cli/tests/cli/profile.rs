@@ -96,7 +96,7 @@ fn show_is_readable() {
     for part in [
         "datakom-d  Datakom D-300, D-500, D-700\n",
         "  unit id           1 to 240, 1 as delivered\n",
-        "  10246  50247  Genset phase L1 voltage ",
+        "  10246  410247  Genset phase L1 voltage ",
         "shutdown_alarms, load_dump_alarms, warning_alarms\n",
         "   bit 48  Genset low frequency\n",
     ] {

@@ -130,6 +130,20 @@ fn a_read_that_is_cut_is_asked_for_again() {
 }
 
 #[test]
+fn a_short_answer_is_no_value_from_a_device_that_cuts_nothing() {
+    let peer = Peer::new(|request| request.registers(&[request.address]));
+    let call = busbar(&format!(
+        "read smartgen-acc1700 --from {} --unit 1 --timeout 100ms --json battery_voltage engine_speed",
+        peer.url
+    ))
+    .fails();
+    for reading in call.json().as_array().unwrap() {
+        assert_eq!((&reading["value"], &reading["quality"]), (&json!(null), &json!("bad")), "{reading}");
+    }
+    call.says_in_one_sentence("did not answer within 100ms");
+}
+
+#[test]
 fn exceptions_are_bad_points_and_status_1() {
     let peer = Peer::new(|request| match request.address {
         10605 => request.exception(10),
