@@ -8,11 +8,13 @@ use std::path::PathBuf;
 #[path = "../../../fuzz/src/profiles.rs"]
 mod fuzz;
 
+type Target = (&'static str, fn(&[u8]));
+
+const TARGETS: [Target; 2] = [("profile_text", fuzz::profile_text), ("register_image", fuzz::register_image)];
+
 #[test]
 fn every_file_of_every_target() {
-    let targets: [(&str, fn(&[u8])); 2] =
-        [("profile_text", fuzz::profile_text), ("register_image", fuzz::register_image)];
-    for (name, target) in targets {
+    for (name, target) in TARGETS {
         let corpus = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(name);
         let mut files = 0;
         for entry in fs::read_dir(corpus).unwrap() {

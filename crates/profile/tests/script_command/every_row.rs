@@ -132,6 +132,7 @@ fn happen(key: &str, command: &'static Command, args: &[(&str, &str)], course: C
             Next::Write(sent) => {
                 assert_eq!(frame(sent).0, command.steps[0].write.function);
                 writes += 1;
+                assert_eq!(writes, 1, "{key} {} {course:?}: sent again", command.id);
                 bench.outcome(match course {
                     Course::AnswerLost | Course::AnswerLate | Course::Silent => WriteOutcome::Lost,
                     Course::Exception | Course::RefusedYetSo => WriteOutcome::Exception(3),
@@ -141,7 +142,6 @@ fn happen(key: &str, command: &'static Command, args: &[(&str, &str)], course: C
                 written = Some(bench.now);
             }
             Next::Done(report) => {
-                assert!(writes <= 1, "{key} {}: {writes} writes", command.id);
                 assert_eq!(report.sent, if course == Course::NotSent { 0 } else { writes });
                 assert_eq!(bench.ask(), Next::Done(report.clone()), "the end is the end");
                 return report;
