@@ -1,6 +1,5 @@
 //! The site file: which wires and devices there are. TOML, checked as a whole before anything starts.
 
-mod findings;
 mod reader;
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -9,11 +8,9 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use busbar_link::Endpoint;
-use busbar_profile::{Profile, WordOrder};
+use busbar_profile::{Collector, Findings, Profile, WordOrder};
 use toml::de::DeTable;
 
-use self::findings::Collector;
-pub use self::findings::{Finding, Findings};
 use self::reader::{At, Table};
 
 /// Where the gateway listens unless it is told otherwise: this machine only.

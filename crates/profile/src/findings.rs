@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
-/// One mistake in a profile or vocabulary file.
+/// One mistake in a profile, vocabulary or site file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Finding {
@@ -86,19 +86,21 @@ impl fmt::Display for Findings {
 impl std::error::Error for Findings {}
 
 /// Collects findings while a text is read.
-pub(crate) struct Collector<'a> {
+#[derive(Debug)]
+pub struct Collector<'a> {
     file: &'a str,
     text: &'a str,
     findings: Vec<Finding>,
 }
 
 impl<'a> Collector<'a> {
-    pub(crate) fn new(file: &'a str, text: &'a str) -> Self {
+    /// Nothing found yet in `text`; `file` is what the findings call it.
+    pub fn new(file: &'a str, text: &'a str) -> Self {
         Self { file, text, findings: Vec::new() }
     }
 
     /// Notes a mistake; a span outside the text is brought back into it.
-    pub(crate) fn add(&mut self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) {
+    pub fn add(&mut self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) {
         let offset = floor_char_boundary(self.text, span.start);
         let end = floor_char_boundary(self.text, span.end.max(offset));
         let before = &self.text[..offset];
@@ -123,6 +125,11 @@ impl<'a> Collector<'a> {
 
     pub(crate) fn is_empty(&self) -> bool {
         self.findings.is_empty()
+    }
+
+    /// `Err` when anything was found.
+    pub fn finish(self) -> Result<(), Findings> {
+        if self.is_empty() { Ok(()) } else { Err(self.into_findings()) }
     }
 
     /// The findings in the order of the text, each once.

@@ -46,7 +46,7 @@ pub use builtin::{builtin, builtins};
 pub use clock::{DateTime, ParseDateTimeError};
 pub use codec::EncodeError;
 pub use command::Command;
-pub use findings::{Finding, Findings};
+pub use findings::{Collector, Finding, Findings};
 pub use image::Image;
 pub use joined::{Joined, JoinedParts, JoinedReading, JoinedValue};
 pub use number::{Number, ParseNumberError, Scale};

@@ -5,12 +5,7 @@ use std::{net::SocketAddr, path::Path};
 use busbar_gateway::{Gateway, Options, Site, StartError};
 use serde::Serialize;
 
-use crate::{
-    args,
-    excerpt::{Excerpt, Excerpts},
-    failure::Failure,
-    logging, profiles, runtime, terminal,
-};
+use crate::{args, failure::Failure, logging, profiles, runtime, terminal};
 
 /// Where the page is, as `--json` prints it.
 #[derive(Serialize)]
@@ -48,21 +43,8 @@ pub(crate) fn run(args: &args::Run, json: bool) -> Result<(), Failure> {
 fn site(path: &Path) -> Result<Site, Failure> {
     let text = profiles::read(path, "site file")?;
     let file = path.display().to_string();
-    Site::parse(&file, &text).map_err(|findings| {
-        let excerpts = findings
-            .iter()
-            .map(|finding| Excerpt {
-                sentence: format!(
-                    "{}:{}:{}: {}",
-                    finding.file, finding.line, finding.column, finding.message
-                ),
-                help: finding.help.clone(),
-                offset: finding.offset,
-                length: finding.length,
-            })
-            .collect();
-        Failure::Findings(Box::new(Excerpts::new(&file, text, excerpts)))
-    })
+    Site::parse(&file, &text)
+        .map_err(|findings| Failure::Findings(Box::new(profiles::excerpts(&file, text, &findings))))
 }
 
 pub(super) async fn gateway(site: Site, listen: Option<SocketAddr>) -> Result<Gateway, Failure> {

@@ -3,10 +3,9 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use busbar_profile::Collector;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-
-use super::findings::Collector;
 
 /// A value and where it stands in the text.
 #[derive(Debug, Clone)]
