@@ -402,7 +402,7 @@ export interface components {
         ModeView: {
             /**
              * Format: int32
-             * @description The code in the register.
+             * @description The code in the register, or the number of the bit where each mode has a bit of its own.
              * @example 4
              */
             code: number;

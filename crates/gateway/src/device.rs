@@ -395,8 +395,15 @@ impl Device {
     }
 
     fn mode_view(&self, index: usize) -> Option<ModeView> {
-        let code = self.good(index)?.as_code()?;
-        Some(ModeView { code, label: self.site.profile.points[index].label(code, self.model).into_owned() })
+        let point = &self.site.profile.points[index];
+        let value = self.good(index)?;
+        if let Some(code) = value.as_code() {
+            return Some(ModeView { code, label: point.label(code, self.model).into_owned() });
+        }
+        // A word of bits has one bit for each mode.
+        let set = value.as_bits()?;
+        let mode = point.bits.iter().find(|bit| bit.state.is_some() && set.contains(bit.bit))?;
+        Some(ModeView { code: u32::from(mode.bit), label: mode.label.clone() })
     }
 
     pub(crate) fn alarm_views(&self) -> Vec<AlarmView> {

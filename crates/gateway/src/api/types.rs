@@ -123,7 +123,7 @@ pub struct StateView {
 /// The mode a device is in.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ModeView {
-    /// The code in the register.
+    /// The code in the register, or the number of the bit where each mode has a bit of its own.
     #[schema(examples(4))]
     pub code: u32,
     /// The maker's name of that mode.

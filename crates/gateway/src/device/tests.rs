@@ -2,7 +2,9 @@ use busbar_link::Cause;
 
 use super::*;
 use crate::api::types::{PointValue, Quality as Shown};
-use crate::testing::{answered, at, device, failed, outage, profile, refusal, silence, timeout, ts};
+use crate::testing::{
+    answered, at, device, failed, outage, profile, refusal, silence, site_device, timeout, ts,
+};
 
 /// At rest, OFF, 0 s, -, 230.2 V, 21.5 degC, -, hours 12.34, no alarms.
 const FAST: [u16; 12] = [0, 1, 0, 0, 2302, 0, 215, 0, 1234, 0, 0, 0];
@@ -47,6 +49,21 @@ fn before_the_first_round_nothing_is_claimed() {
         (PointValue::None, Shown::Stale, None, None)
     );
     assert!(!device.values().iter().any(|value| value.id == "picture"), "read on demand only");
+}
+
+#[test]
+fn a_mode_may_be_a_bit_of_its_own() {
+    let profile = busbar_profile::builtin("datakom-dkg705").unwrap();
+    let mut device = Device::new(SiteDevice { profile, ..site_device("dkg") }, "w1".to_owned());
+    let mode = profile.signal("mode").unwrap();
+    let mut read = |registers: u16| {
+        device.finish(answered(Rate::Fast, &[(mode.address, &[registers])]), at(0), ts(0));
+        device.view().mode
+    };
+    let auto = read(1 << 4).unwrap();
+    assert_eq!((auto.code, auto.label.as_str()), (4, mode.bit_label(4).as_ref()));
+    assert_eq!(read(1 << 5).unwrap().code, 5);
+    assert_eq!(read(0), None);
 }
 
 #[test]
