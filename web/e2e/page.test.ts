@@ -148,7 +148,8 @@ test('by keyboard alone: a line opens and tells address and 4xxxx number', async
   const [register, plc] = ((await address.textContent()) ?? '')
     .split('·')
     .map((part) => Number.parseInt(part))
-  expect(plc).toBe(40001 + (register ?? NaN))
+  // Five digits end at address 9998; every register of a D-500 lies above.
+  expect(plc).toBe(400001 + (register ?? NaN))
   await page.keyboard.press('Enter')
   expect(await button.getAttribute('aria-expanded')).toBe('false')
   await page.close()
