@@ -197,4 +197,8 @@ impl Map for Bank {
     fn is_writable(&self, address: u16) -> bool {
         self.writable.contains(&address)
     }
+
+    fn is_coil(&self, address: u16) -> bool {
+        self.profile.coils.iter().any(|coil| coil.address == address)
+    }
 }

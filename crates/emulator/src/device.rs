@@ -11,7 +11,7 @@ use crate::datakom_d::DatakomD;
 use crate::error::StartError;
 use crate::panel::Panel;
 use crate::pins;
-use crate::rules::{Permitted, Refusals, permit};
+use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
 
 /// The plant and the panel move in steps of this much simulated time, whatever the speed: so the same inputs at
 /// the same simulated times give the same registers.
@@ -88,6 +88,11 @@ impl Device {
             Ok(Permitted::Write { address, value }) => {
                 self.write(address, Registers::from(&[value]));
                 Response::WriteSingleRegister { address, value }
+            }
+            Ok(Permitted::WriteCoil { address, on }) => {
+                self.panel.write_coil(address, on);
+                self.panel.render(&mut self.bank);
+                Response::WriteSingleCoil { address, value: if on { COIL_ON } else { COIL_OFF } }
             }
             Ok(Permitted::WriteSeveral { address, registers }) => {
                 self.write(address, registers);

@@ -14,14 +14,17 @@ pub(crate) trait Panel: Debug + Send {
     /// Takes a write to a register that the profile says is writable. Values that mean nothing have no effect.
     fn write(&mut self, address: u16, value: u16);
 
+    /// Takes a write to a coil that the profile lists. For families without coils there is nothing to take.
+    fn write_coil(&mut self, _address: u16, _on: bool) {}
+
     /// Whether the controller is restarting: it then hears and answers nothing.
     fn is_silent(&self) -> bool;
 
     /// Stores every documented register.
     fn render(&self, bank: &mut Bank);
 
-    /// A packet has come in over Ethernet.
-    fn count_packet(&mut self, bank: &mut Bank);
+    /// A packet has come in over Ethernet; most families do not count them.
+    fn count_packet(&mut self, _bank: &mut Bank) {}
 
     /// The maker's exception codes.
     fn refusals(&self) -> Refusals;

@@ -6,12 +6,18 @@ use busbar_profile::{OverRead, Wire};
 /// More registers than fit one answer of the protocol; what a device does from there on is the maker's rule.
 const MOST_REGISTERS: u16 = 125;
 
-/// Which registers a device has.
+/// The only two values of function 5 (V1.1b3, 6.5).
+pub(crate) const COIL_ON: u16 = 0xFF00;
+pub(crate) const COIL_OFF: u16 = 0x0000;
+
+/// Which registers and coils a device has.
 pub(crate) trait Map {
     /// Whether all of `count` registers from `address` on may be read.
     fn is_readable(&self, address: u16, count: u16) -> bool;
     /// Whether a register may be written.
     fn is_writable(&self, address: u16) -> bool;
+    /// Whether there is a coil that may be written.
+    fn is_coil(&self, address: u16) -> bool;
 }
 
 /// The maker's own exception codes.
@@ -30,6 +36,8 @@ pub(crate) enum Permitted<'a> {
     Read { address: u16, count: u16 },
     /// One register.
     Write { address: u16, value: u16 },
+    /// One coil.
+    WriteCoil { address: u16, on: bool },
     /// Several registers, every one of them writable.
     WriteSeveral { address: u16, registers: Registers<'a> },
 }
@@ -66,6 +74,16 @@ pub(crate) fn permit<'a>(
         Request::WriteSingleRegister { address, value } => {
             writable(map, refusals, address, 1)?;
             Ok(Permitted::Write { address, value })
+        }
+        Request::WriteSingleCoil { address, value } => {
+            if !map.is_coil(address) {
+                return Err(ExceptionCode::ILLEGAL_DATA_ADDRESS);
+            }
+            match value {
+                COIL_ON => Ok(Permitted::WriteCoil { address, on: true }),
+                COIL_OFF => Ok(Permitted::WriteCoil { address, on: false }),
+                _ => Err(ExceptionCode::ILLEGAL_DATA_VALUE),
+            }
         }
         Request::WriteMultipleRegisters { address, registers } => {
             let count = registers.len();
