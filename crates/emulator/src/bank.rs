@@ -1,7 +1,8 @@
 //! The registers of one device, always ready to be read: the panel fills them on its tick, through the profile.
 
-use busbar_profile::{BitSet, Number, Point, Profile, Value};
+use busbar_profile::{BitSet, DataType, Number, Point, Profile, Value};
 
+use crate::random::Random;
 use crate::rules::Map;
 
 /// Finer than any meter: the profile rounds to what the register holds.
@@ -19,6 +20,8 @@ pub(crate) struct Bank {
     /// Index of the point that starts here.
     point_at: Vec<Option<usize>>,
     pinned: Vec<bool>,
+    /// Places of registers with a high byte that means nothing.
+    hollow: Vec<usize>,
     /// Values the profile could not hold; a panel of ours has none.
     refused: u64,
 }
@@ -57,6 +60,7 @@ impl Bank {
             writable,
             point_at,
             pinned: vec![false; profile.points.len()],
+            hollow: hollow(profile, first, length),
             refused: 0,
         }
     }
@@ -85,6 +89,15 @@ impl Bank {
         if let Some(slots) = self.slots(point).filter(|slots| slots.len() == registers.len()) {
             slots.copy_from_slice(registers);
             self.pinned[index] = true;
+        }
+    }
+
+    /// Fills the bytes that mean nothing anew: whoever takes them for a part of the value shall notice.
+    pub(crate) fn stir(&mut self, random: &mut Random) {
+        for place in &self.hollow {
+            if let Some(register) = self.registers.get_mut(*place) {
+                *register = *register & 0x00FF | random.bits() as u16 & 0xFF00;
+            }
         }
     }
 
@@ -200,5 +213,110 @@ impl Map for Bank {
 
     fn is_coil(&self, address: u16) -> bool {
         self.profile.coils.iter().any(|coil| coil.address == address)
+    }
+}
+
+/// Places of the registers whose low byte holds points and whose high byte holds none: the manual calls them 8 bits
+/// wide, and what stands in the rest is nobody's business (DKG manual, rule for 8-bit data).
+fn hollow(profile: &Profile, first: u16, length: usize) -> Vec<usize> {
+    let mut taken = vec![0; length];
+    for point in profile.points.iter().filter(|point| point.access.is_readable()) {
+        let Some(from) = point.address.checked_sub(first).map(usize::from) else { continue };
+        for (offset, bits) in taken.iter_mut().skip(from).take(usize::from(point.registers)).enumerate() {
+            *bits |= bits_taken(point, offset);
+        }
+    }
+    (0..length).filter(|place| taken[*place] != 0 && taken[*place] & 0xFF00 == 0).collect()
+}
+
+/// The bits of one of its registers that belong to a point.
+fn bits_taken(point: &Point, register: usize) -> u16 {
+    match (point.field, point.data_type) {
+        (Some((high, low)), _) => lowest(usize::from(high) + 1) & !lowest(usize::from(low)),
+        (None, DataType::U8 | DataType::I8 | DataType::Fraction8) => 0x00FF,
+        (None, _) => lowest(point.size.map_or(16, |size| usize::from(size).saturating_sub(16 * register))),
+    }
+}
+
+fn lowest(bits: usize) -> u16 {
+    match bits {
+        16.. => 0xFFFF,
+        _ => (1 << bits) - 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bank(key: &str) -> Bank {
+        Bank::new(busbar_profile::builtin(key).unwrap())
+    }
+
+    fn hollow_registers(key: &str) -> Vec<u16> {
+        let bank = bank(key);
+        bank.hollow.iter().map(|place| bank.first + *place as u16).collect()
+    }
+
+    #[test]
+    fn the_registers_that_a_manual_calls_8_bits_wide_are_hollow() {
+        let dkg = hollow_registers("datakom-dkg705");
+        for (address, expected, what) in [
+            (0x0014, true, "bits, size 8"),
+            (0x0018, true, "a signed byte"),
+            (0x0024, true, "a byte that can be written"),
+            (0x0030, true, "a share in 8 bits"),
+            (0x0039, true, "relays"),
+            (0x003F, true, "a code in the low byte"),
+            (0x0040, true, "the last key"),
+            (0x0070, true, "an FMI"),
+            (0x1026, true, "two points, both in the low byte"),
+            (0x0000, false, "16 bits"),
+            (0x0016, false, "32 bits, low word"),
+            (0x0032, false, "alarm bits"),
+            (0x003A, false, "16 relays"),
+            (0x0041, false, "a share in 16 bits"),
+            (0x102C, false, "declared as 16 bits, half of them named"),
+            (0x102D, false, "another point in the high byte"),
+        ] {
+            assert_eq!(dkg.contains(&address), expected, "{address:04X}: {what}");
+        }
+        // The manual prints 60 rows of 8 bits, and two signed bytes in rows of 16.
+        assert_eq!(dkg.len(), 62);
+        for key in ["datakom-d", "smartgen-hat821si", "smartgen-acc1700"] {
+            assert!(hollow_registers(key).is_empty(), "{key}");
+        }
+    }
+
+    #[test]
+    fn hollow_bytes_change_and_no_value_does() {
+        let mut bank = bank("datakom-dkg705");
+        let points = &bank.profile.points;
+        let values = |bank: &Bank| -> Vec<_> {
+            points
+                .iter()
+                .map(|point| {
+                    point.decode(
+                        bank.read(point.address, point.registers).unwrap(),
+                        bank.profile.wire.word_order,
+                    )
+                })
+                .collect()
+        };
+        bank.integer(0x0024, 26);
+        bank.number(0x0018, -0.5);
+        let before = values(&bank);
+        let mut seen = std::collections::BTreeSet::new();
+        for seed in 0..50 {
+            bank.stir(&mut Random::new(seed));
+            assert_eq!(values(&bank), before);
+            seen.insert(bank.read(0x0024, 1).unwrap()[0]);
+            bank.integer(0x0024, 26);
+        }
+        assert!(seen.len() > 30, "{seen:02X?}");
+        assert_eq!(bank.refused(), 0);
+        let once = bank.clone();
+        bank.stir(&mut Random::new(49));
+        assert_eq!(bank.registers, once.registers, "the same seed, the same noise");
     }
 }

@@ -11,6 +11,7 @@ use crate::datakom_d::DatakomD;
 use crate::error::StartError;
 use crate::panel::Panel;
 use crate::pins;
+use crate::random::Random;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
 
 /// The plant and the panel move in steps of this much simulated time, whatever the speed: so the same inputs at
@@ -29,6 +30,7 @@ pub struct Device {
     refusals: Refusals,
     panel: Box<dyn Panel>,
     clock: Duration,
+    seed: u64,
 }
 
 impl Device {
@@ -50,7 +52,10 @@ impl Device {
             bank.pin(index, &registers);
         }
         panel.render(&mut bank);
-        Ok(Self { unit: config.unit, bank, refusals: panel.refusals(), panel, clock: Duration::ZERO })
+        let (unit, seed, refusals) = (config.unit, config.seed, panel.refusals());
+        let mut device = Self { unit, bank, refusals, panel, clock: Duration::ZERO, seed };
+        device.stir();
+        Ok(device)
     }
 
     /// Lets the plant live until `now`, simulated time since power-on, and refreshes the registers.
@@ -63,6 +68,7 @@ impl Device {
         }
         if moved {
             self.panel.render(&mut self.bank);
+            self.stir();
         }
     }
 
@@ -101,6 +107,11 @@ impl Device {
         })
     }
 
+    /// The unit id that it answers to.
+    pub fn unit(&self) -> u8 {
+        self.unit
+    }
+
     /// Whether it is restarting: whoever carries its connections drops them.
     pub fn is_silent(&self) -> bool {
         self.panel.is_silent()
@@ -124,6 +135,12 @@ impl Device {
     /// How many values of the panel its profile could not hold since power-on; anything but 0 is our fault.
     pub fn misfits(&self) -> u64 {
         self.bank.refused()
+    }
+
+    /// Noise that depends on the seed and the time alone, however time was let pass.
+    fn stir(&mut self) {
+        let ticks = self.clock.as_millis() as u64 / STEP.as_millis() as u64;
+        self.bank.stir(&mut Random::new(self.seed.rotate_left(32) ^ ticks));
     }
 
     fn write(&mut self, address: u16, registers: Registers<'_>) {

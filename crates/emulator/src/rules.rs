@@ -76,13 +76,15 @@ pub(crate) fn permit<'a>(
             Ok(Permitted::Write { address, value })
         }
         Request::WriteSingleCoil { address, value } => {
-            if !map.is_coil(address) {
-                return Err(ExceptionCode::ILLEGAL_DATA_ADDRESS);
-            }
-            match value {
-                COIL_ON => Ok(Permitted::WriteCoil { address, on: true }),
-                COIL_OFF => Ok(Permitted::WriteCoil { address, on: false }),
-                _ => Err(ExceptionCode::ILLEGAL_DATA_VALUE),
+            // The value before the address (V1.1b3, figure 15).
+            let on = match value {
+                COIL_ON => true,
+                COIL_OFF => false,
+                _ => return Err(ExceptionCode::ILLEGAL_DATA_VALUE),
+            };
+            match map.is_coil(address) {
+                true => Ok(Permitted::WriteCoil { address, on }),
+                false => Err(ExceptionCode::ILLEGAL_DATA_ADDRESS),
             }
         }
         Request::WriteMultipleRegisters { address, registers } => {

@@ -23,6 +23,8 @@ pub struct Point {
     pub data_type: DataType,
     /// The bits of one register that it takes, highest and lowest, where it does not take all of them.
     pub field: Option<(u8, u8)>,
+    /// How many bits the manual gives it, where the type leaves that open: sets, lists of codes, bytes and pictures.
+    pub size: Option<u16>,
     /// Unit of the number.
     pub unit: Option<String>,
     /// How the raw number becomes a value; none where the manual gives none, and the raw number is the value.

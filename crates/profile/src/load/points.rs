@@ -62,6 +62,7 @@ impl<'a> Check<'a> {
             access: file.access.unwrap_or(Access::Read),
             data_type: *file.data_type,
             field: file.mask.as_deref().copied(),
+            size: file.size.as_deref().copied(),
             unit: file.unit.as_deref().cloned(),
             scale: scale_of,
             signal: file.signal.as_deref().cloned(),
