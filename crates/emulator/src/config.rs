@@ -13,7 +13,8 @@ pub struct Config {
     pub unit: u8,
     /// Model of the family; the demonstration model when none is given.
     pub model: Option<String>,
-    /// Where to listen; port 0 lets the system choose. Several endpoints share one plant.
+    /// Where to listen; port 0 lets the system choose, and so does `rtu://pty` a pseudo-terminal. Several endpoints
+    /// share one plant.
     pub listen: Vec<Endpoint>,
     /// The same seed, inputs and simulated time give the same registers.
     pub seed: u64,

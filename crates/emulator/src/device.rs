@@ -31,6 +31,7 @@ pub struct Device {
     panel: Box<dyn Panel>,
     clock: Duration,
     seed: u64,
+    answer_delay: Duration,
 }
 
 impl Device {
@@ -52,8 +53,9 @@ impl Device {
             bank.pin(index, &registers);
         }
         panel.render(&mut bank);
+        let answer_delay = profile.wire.answer_delay();
         let (unit, seed, refusals) = (config.unit, config.seed, panel.refusals());
-        let mut device = Self { unit, bank, refusals, panel, clock: Duration::ZERO, seed };
+        let mut device = Self { unit, bank, refusals, panel, clock: Duration::ZERO, seed, answer_delay };
         device.stir();
         Ok(device)
     }
@@ -110,6 +112,11 @@ impl Device {
     /// The unit id that it answers to.
     pub fn unit(&self) -> u8 {
         self.unit
+    }
+
+    /// It answers no sooner than this after a request.
+    pub fn answer_delay(&self) -> Duration {
+        self.answer_delay
     }
 
     /// Whether it is restarting: whoever carries its connections drops them.

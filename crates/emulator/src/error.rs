@@ -2,8 +2,8 @@
 
 use std::io;
 
-use busbar_link::Endpoint;
-use busbar_profile::Number;
+use busbar_link::{Endpoint, SerialError};
+use busbar_profile::{Number, SerialSettings};
 
 /// An imitation was not started; nothing is left running.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -54,8 +54,40 @@ pub enum StartError {
     #[error("an imitated controller needs at least one endpoint to listen on, such as tcp://127.0.0.1:1502")]
     NoEndpoint,
     /// The endpoint is of a kind that imitations do not listen on.
-    #[error("cannot listen on {endpoint}: this version imitates over tcp:// only")]
+    #[error("cannot listen on {endpoint}: imitated controllers speak tcp://, rtu:// and rtu+tcp://")]
     Transport {
+        /// The endpoint.
+        endpoint: Endpoint,
+    },
+    /// Two controllers would answer to one unit id.
+    #[error("unit {unit} is there twice on {endpoint}; give each controller of a wire a unit id of its own")]
+    SameUnit {
+        /// The unit id.
+        unit: u8,
+        /// The endpoint.
+        endpoint: Endpoint,
+    },
+    /// The controller cannot be set to such a line.
+    #[error("cannot listen on {endpoint}: {key} has no such line; choose {}", offered(.has))]
+    LineSettings {
+        /// The endpoint.
+        endpoint: Endpoint,
+        /// The controller's profile.
+        key: String,
+        /// What it can be set to.
+        has: SerialSettings,
+    },
+    /// The serial device cannot be used.
+    #[error("cannot listen on {endpoint}: {problem}")]
+    SerialDevice {
+        /// The endpoint.
+        endpoint: Endpoint,
+        /// Why, and what to do.
+        problem: SerialError,
+    },
+    /// The system has no pseudo-terminals that we know how to make.
+    #[error("cannot listen on {endpoint}: pseudo-terminals are made on Linux only; use rtu+tcp:// instead")]
+    NoPseudoTerminal {
         /// The endpoint.
         endpoint: Endpoint,
     },
@@ -159,6 +191,19 @@ fn listen_reason(kind: io::ErrorKind) -> String {
         io::ErrorKind::PermissionDenied => "this user may not use that port; choose one above 1023".into(),
         io::ErrorKind::AddrNotAvailable => "this machine does not have that address".into(),
         other => other.to_string(),
+    }
+}
+
+fn offered(has: &SerialSettings) -> String {
+    format!("baud {}, parity {}, stop {}", either(&has.baud), either(&has.parity), either(&has.stop))
+}
+
+/// `a, b or c`.
+fn either(choices: &[impl ToString]) -> String {
+    let mut words: Vec<_> = choices.iter().map(ToString::to_string).collect();
+    match words.pop() {
+        Some(last) if !words.is_empty() => format!("{} or {last}", words.join(", ")),
+        last => last.unwrap_or_default(),
     }
 }
 

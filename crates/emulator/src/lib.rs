@@ -4,7 +4,7 @@
 //! - the plant (mains, genset, load, tank) is stepped by a simulated clock and a seed;
 //! - a panel reads it, drives it, and stores every documented register through the profile;
 //! - [`Device`] puts the wire rules in front: requests in, responses out, no I/O;
-//! - [`start`] gives a device sockets and a clock.
+//! - [`start`] gives a device sockets, serial lines and a clock; [`start_together`] puts several on one wire.
 
 mod bank;
 mod config;
@@ -23,7 +23,7 @@ mod waveform;
 pub use config::Config;
 pub use device::{Device, STEP};
 pub use error::{PinError, PinProblem, StartError};
-pub use server::{Emulation, Statistics, start};
+pub use server::{Emulation, Statistics, start, start_together};
 
 /// The fastest simulated clock: an hour a second.
 pub const MAX_SPEED: f64 = 3600.0;

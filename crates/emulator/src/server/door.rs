@@ -1,0 +1,172 @@
+//! What stands behind an endpoint: which devices answer there, and what has happened.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use busbar_link::Endpoint;
+use busbar_modbus::pdu::EXCEPTION_BIT;
+use busbar_modbus::stream::Frame;
+use busbar_modbus::{ExceptionCode, Framing, Losses, Request, Response, mbap, rtu};
+use tokio::sync::{Semaphore, watch};
+
+use crate::device::Device;
+
+/// What has happened on the wires of an imitation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Statistics {
+    /// Connections accepted.
+    pub connections: u64,
+    /// Connections closed at once: too many, or the device was restarting.
+    pub turned_away: u64,
+    /// Requests that came, whoever they were for.
+    pub requests: u64,
+    /// Requests that were answered.
+    pub answers: u64,
+    /// Bytes and frames that were no requests.
+    pub garbage: u64,
+    /// Serial lines: requests lost because they came while an answer was on its way.
+    pub collisions: u64,
+}
+
+impl std::ops::AddAssign for Statistics {
+    fn add_assign(&mut self, other: Self) {
+        self.connections += other.connections;
+        self.turned_away += other.turned_away;
+        self.requests += other.requests;
+        self.answers += other.answers;
+        self.garbage += other.garbage;
+        self.collisions += other.collisions;
+    }
+}
+
+/// A device that several endpoints may share.
+#[derive(Debug)]
+pub(super) struct Served {
+    device: Mutex<Device>,
+    /// Tells when the device restarts, which drops the connections of its own Ethernet port.
+    pub(super) restarts: watch::Sender<()>,
+}
+
+impl Served {
+    pub(super) fn new(device: Device) -> Self {
+        Self { device: Mutex::new(device), restarts: watch::Sender::new(()) }
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Device> {
+        // A panel that panicked would have been caught half-way; registers are still registers.
+        self.device.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// One endpoint from inside.
+#[derive(Debug)]
+pub(super) struct Door {
+    pub(super) endpoint: Endpoint,
+    /// The devices that can be reached, each with its unit id.
+    pub(super) devices: Vec<(u8, Arc<Served>)>,
+    pub(super) places: Arc<Semaphore>,
+    pub(super) idle: Duration,
+    statistics: Mutex<Statistics>,
+}
+
+/// What came of a batch of requests.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Outcome {
+    /// How long the slowest of the devices takes before it answers.
+    pub(super) delay: Duration,
+    /// A device restarts because of it.
+    pub(super) restarting: bool,
+}
+
+impl Door {
+    pub(super) fn new(
+        endpoint: Endpoint,
+        devices: Vec<(u8, Arc<Served>)>,
+        places: Arc<Semaphore>,
+        idle: Duration,
+    ) -> Self {
+        Self { endpoint, devices, places, idle, statistics: Mutex::default() }
+    }
+
+    pub(super) fn framing(&self) -> Framing {
+        match self.endpoint {
+            Endpoint::Tcp { .. } => Framing::Tcp,
+            _ => Framing::Rtu,
+        }
+    }
+
+    /// The device whose own Ethernet port this is. Behind RTU frames, or beside others, it is reached through a
+    /// converter, which outlives its restarts and whose packets it does not see.
+    pub(super) fn owner(&self) -> Option<&Arc<Served>> {
+        match (&self.endpoint, self.devices.as_slice()) {
+            (Endpoint::Tcp { .. }, [(_, device)]) => Some(device),
+            _ => None,
+        }
+    }
+
+    pub(super) fn statistics(&self) -> MutexGuard<'_, Statistics> {
+        self.statistics.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Appends the answer to one frame, if there is one.
+    pub(super) fn answer(&self, frame: &Frame<'_>, out: &mut Vec<u8>) -> Option<Outcome> {
+        let framing = self.framing();
+        let Some(request) = request(framing, frame.pdu) else {
+            self.statistics().garbage += 1;
+            return None;
+        };
+        self.statistics().requests += 1;
+        let (_, served) = self.devices.iter().find(|(unit, _)| *unit == frame.unit)?;
+        let mut device = served.lock();
+        let response = device.answer(frame.unit, &request)?;
+        if !encode(framing, frame, &response, out) {
+            return None;
+        }
+        self.statistics().answers += 1;
+        Some(Outcome { delay: device.answer_delay(), restarting: device.is_silent() })
+    }
+
+    /// Tells every connection of the devices that restart.
+    pub(super) fn announce_restarts(&self) {
+        for (_, served) in &self.devices {
+            if served.lock().is_silent() {
+                served.restarts.send_replace(());
+            }
+        }
+    }
+}
+
+impl Outcome {
+    /// The outcome of several requests together.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self { delay: self.delay.max(other.delay), restarting: self.restarting || other.restarting }
+    }
+}
+
+/// What a client asks. Over TCP function 0 gets the answer of any other that a device does not have; on RTU it never
+/// becomes a frame.
+fn request(framing: Framing, pdu: &[u8]) -> Option<Request<'_>> {
+    match (framing, pdu) {
+        (Framing::Tcp, [0, data @ ..]) => Some(Request::Other { function: 0, data }),
+        _ => Request::decode(pdu).ok(),
+    }
+}
+
+fn encode(framing: Framing, frame: &Frame<'_>, response: &Response<'_>, out: &mut Vec<u8>) -> bool {
+    let (transaction, unit) = (frame.transaction, frame.unit);
+    match (framing, response) {
+        // No encoder writes function 0: it is no function.
+        (Framing::Tcp, Response::Exception { function: 0, code: ExceptionCode(code) }) => {
+            let [high, low] = transaction.to_be_bytes();
+            out.extend_from_slice(&[high, low, 0, 0, 0, 3, unit, EXCEPTION_BIT, *code]);
+            true
+        }
+        (Framing::Tcp, response) => mbap::encode_response(transaction, unit, response, out).is_ok(),
+        (Framing::Rtu, response) => rtu::encode_response(unit, response, out).is_ok(),
+    }
+}
+
+pub(super) fn dropped(losses: &Losses) -> u64 {
+    losses.garbage_bytes + losses.crc_errors + losses.wrong_protocol
+}

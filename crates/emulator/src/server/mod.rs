@@ -1,0 +1,218 @@
+//! Sockets, lines and a clock for devices; everything that decides anything is in [`Device`] and in `line`.
+
+mod bind;
+mod door;
+mod line;
+mod pty;
+mod serial;
+mod tcp;
+mod timer;
+
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use busbar_link::Endpoint;
+use tokio::sync::Semaphore;
+use tokio::task::JoinSet;
+use tokio::time::{Instant, MissedTickBehavior, interval};
+
+use crate::MAX_SPEED;
+use crate::config::Config;
+use crate::device::{Device, STEP};
+use crate::error::StartError;
+use bind::Socket;
+pub use door::Statistics;
+use door::{Door, Served};
+
+/// A clock that was held up (a sleeping laptop, a debugger) does not make up for more than this.
+const MOST_LAPSE: Duration = Duration::from_secs(2);
+/// A client that takes no answers for so long is dropped.
+const WRITE_PATIENCE: Duration = Duration::from_secs(10);
+/// Far enough away to be never, near enough for a clock to hold.
+const LONGEST_IDLE: Duration = Duration::from_secs(365 * 86_400);
+
+/// Starts an imitated controller: binds every endpoint or none.
+///
+/// # Errors
+/// The configuration is not possible, or an endpoint cannot be listened on.
+pub async fn start(config: Config) -> Result<Emulation, StartError> {
+    start_together(vec![config], Vec::new()).await
+}
+
+/// Starts several imitated controllers that share endpoints, as units of one serial line or behind one converter:
+/// binds every endpoint or none.
+///
+/// Each answers to its own unit id on all of `listen`, and alone on the endpoints of its own configuration. On
+/// `listen` the strictest of the limits on connections holds.
+///
+/// # Errors
+/// As [`start`]; and two controllers have the same unit id.
+pub async fn start_together(configs: Vec<Config>, listen: Vec<Endpoint>) -> Result<Emulation, StartError> {
+    let mut devices = Vec::new();
+    for config in &configs {
+        if !(config.speed > 0.0 && config.speed <= MAX_SPEED) {
+            return Err(StartError::Speed { speed: config.speed.to_string() });
+        }
+        if listen.is_empty() && config.listen.is_empty() {
+            return Err(StartError::NoEndpoint);
+        }
+        devices.push(Device::new(config)?);
+    }
+    serve(&configs, devices, &listen).await
+}
+
+async fn serve(
+    configs: &[Config],
+    devices: Vec<Device>,
+    listen: &[Endpoint],
+) -> Result<Emulation, StartError> {
+    let served: Vec<_> = devices
+        .into_iter()
+        .map(|device| (device.unit(), device.profile(), Arc::new(Served::new(device))))
+        .collect();
+    let rooms = rooms(configs, listen);
+    for room in &rooms {
+        room.check(&served)?;
+    }
+    let mut sockets = Vec::new();
+    for room in rooms {
+        sockets.push((Socket::bind(room.endpoint).await?, room));
+    }
+
+    let mut tasks = JoinSet::new();
+    for (config, (_, _, device)) in configs.iter().zip(&served) {
+        tasks.spawn(tick(Arc::clone(device), config.speed));
+    }
+    let (mut urls, mut doors) = (Vec::new(), Vec::new());
+    for ((url, socket), room) in sockets {
+        let devices = room.members(&served).map(|(unit, _, device)| (*unit, Arc::clone(device))).collect();
+        let door = Arc::new(Door::new(url.clone(), devices, room.places, room.idle));
+        socket.open(Arc::clone(&door), &mut tasks);
+        urls.push(url);
+        doors.push(door);
+    }
+    Ok(Emulation { urls, doors, tasks })
+}
+
+/// A running imitation; dropping it ends it.
+#[derive(Debug)]
+pub struct Emulation {
+    urls: Vec<Endpoint>,
+    doors: Vec<Arc<Door>>,
+    tasks: JoinSet<()>,
+}
+
+impl Emulation {
+    /// The endpoints listened on, with the ports and pseudo-terminals that the system chose: the shared ones first,
+    /// then those of each configuration, in their order.
+    pub fn urls(&self) -> &[Endpoint] {
+        &self.urls
+    }
+
+    /// What has happened on all its endpoints so far.
+    pub fn statistics(&self) -> Statistics {
+        let mut all = Statistics::default();
+        for door in &self.doors {
+            all += *door.statistics();
+        }
+        all
+    }
+
+    /// What has happened on each of its endpoints so far, in the order of [`urls`](Self::urls).
+    pub fn statistics_by_endpoint(&self) -> impl Iterator<Item = (&Endpoint, Statistics)> {
+        self.doors.iter().map(|door| (&door.endpoint, *door.statistics()))
+    }
+
+    /// Drops every connection and frees the ports.
+    pub async fn stop(mut self) {
+        self.tasks.shutdown().await;
+    }
+}
+
+type Member = (u8, &'static busbar_profile::Profile, Arc<Served>);
+
+/// An endpoint to be, and who is to answer there.
+struct Room<'a> {
+    endpoint: &'a Endpoint,
+    /// Index of the only device; none where all of them are reached.
+    only: Option<usize>,
+    places: Arc<Semaphore>,
+    idle: Duration,
+}
+
+fn rooms<'a>(configs: &'a [Config], listen: &'a [Endpoint]) -> Vec<Room<'a>> {
+    let places = |connections: usize| Arc::new(Semaphore::new(connections.min(Semaphore::MAX_PERMITS)));
+    let shared = configs.iter().map(|config| config.connections).min().unwrap_or_default();
+    let shared_places = places(shared);
+    let shared_idle = configs.iter().map(|config| config.idle).min().unwrap_or_default();
+    let mut rooms: Vec<_> = listen
+        .iter()
+        .map(|endpoint| Room {
+            endpoint,
+            only: None,
+            places: Arc::clone(&shared_places),
+            idle: shared_idle.min(LONGEST_IDLE),
+        })
+        .collect();
+    for (index, config) in configs.iter().enumerate() {
+        let places = places(config.connections);
+        rooms.extend(config.listen.iter().map(|endpoint| Room {
+            endpoint,
+            only: Some(index),
+            places: Arc::clone(&places),
+            idle: config.idle.min(LONGEST_IDLE),
+        }));
+    }
+    rooms
+}
+
+impl Room<'_> {
+    fn members<'m>(&self, served: &'m [Member]) -> impl Iterator<Item = &'m Member> {
+        let only = self.only;
+        served
+            .iter()
+            .enumerate()
+            .filter(move |(index, _)| only.is_none_or(|only| only == *index))
+            .map(|(_, m)| m)
+    }
+
+    /// Whether these controllers can be on one wire, and on this one.
+    fn check(&self, served: &[Member]) -> Result<(), StartError> {
+        let mut taken = [false; 256];
+        for (unit, profile, _) in self.members(served) {
+            if std::mem::replace(&mut taken[usize::from(*unit)], true) {
+                return Err(StartError::SameUnit { unit: *unit, endpoint: self.endpoint.clone() });
+            }
+            let Endpoint::Rtu { serial, .. } = self.endpoint else { continue };
+            let has = &profile.wire.serial;
+            let parity = has.parity.iter().any(|parity| parity.as_str() == serial.parity.to_string());
+            let stop = has.stop.iter().any(|stop| stop.to_string() == serial.stop.to_string());
+            if !has.baud.contains(&serial.baud) || !parity || !stop {
+                return Err(StartError::LineSettings {
+                    endpoint: self.endpoint.clone(),
+                    key: profile.key.clone(),
+                    has: has.clone(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The clock of a plant.
+async fn tick(device: Arc<Served>, speed: f64) {
+    let mut interval = interval(STEP);
+    interval.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut simulated = Duration::ZERO;
+    let mut last = Instant::now();
+    loop {
+        interval.tick().await;
+        let now = Instant::now();
+        simulated += now.duration_since(last).min(MOST_LAPSE).mul_f64(speed);
+        last = now;
+        device.lock().advance(simulated);
+    }
+}
