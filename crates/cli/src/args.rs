@@ -74,7 +74,8 @@ pub(crate) struct Emulate {
     /// The profile to imitate
     #[arg(value_name = "KEY")]
     pub(crate) key: String,
-    /// Where to answer, for example tcp://127.0.0.1:1502; port 0 takes a free one; may be repeated
+    /// Where to answer: tcp://127.0.0.1:1502 or rtu+tcp:// (port 0 takes a free one), rtu:///dev/ttyUSB0, or rtu://pty
+    /// for a new pseudo-terminal; may be repeated
     #[arg(long, value_name = "URL", required = true, value_parser = endpoint)]
     pub(crate) listen: Vec<Endpoint>,
     /// Further URLs after the first, as if --listen stood before each.

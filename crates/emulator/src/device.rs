@@ -109,6 +109,11 @@ impl Device {
         })
     }
 
+    #[cfg(test)]
+    pub(crate) fn with_answer_delay(self, answer_delay: Duration) -> Self {
+        Self { answer_delay, ..self }
+    }
+
     /// The unit id that it answers to.
     pub fn unit(&self) -> u8 {
         self.unit

@@ -50,6 +50,9 @@ pub enum StartError {
     /// A value was pinned that its point cannot have.
     #[error(transparent)]
     Pin(#[from] PinError),
+    /// Nothing was given to imitate.
+    #[error("there is no controller to imitate; name at least one")]
+    NoController,
     /// No endpoint was given to listen on.
     #[error("an imitated controller needs at least one endpoint to listen on, such as tcp://127.0.0.1:1502")]
     NoEndpoint,
@@ -75,7 +78,7 @@ pub enum StartError {
         /// The controller's profile.
         key: String,
         /// What it can be set to.
-        has: SerialSettings,
+        has: Box<SerialSettings>,
     },
     /// The serial device cannot be used.
     #[error("cannot listen on {endpoint}: {problem}")]

@@ -1,4 +1,4 @@
-//! `busbar emulate`: one imitated controller on one or more ports.
+//! `busbar emulate`: one imitated controller on one or more ports and lines.
 
 use busbar_emulator::{Config, StartError};
 use busbar_link::Endpoint;
@@ -42,7 +42,10 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
 /// What the machine refuses is a failure; everything else was asked for wrongly.
 pub(crate) fn failure(error: StartError) -> Failure {
     match error {
-        StartError::Listen { .. } | StartError::Transport { .. } => Failure::failed(error),
+        StartError::Listen { .. }
+        | StartError::SerialDevice { .. }
+        | StartError::NoPseudoTerminal { .. }
+        | StartError::Transport { .. } => Failure::failed(error),
         _ => Failure::Call(error.to_string()),
     }
 }

@@ -63,6 +63,32 @@ fn emulate_has_one_json_document() {
     busbar(&format!("registers {url} 10609 1")).ok();
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn emulate_makes_a_pseudo_terminal_and_speaks_rtu_through_tcp() {
+    let mut service = Service::start(
+        "emulate datakom-d --listen rtu://pty?baud=19200 --listen rtu+tcp://127.0.0.1:0".split(' '),
+    );
+    let (line, converter) = (service.line(), service.line());
+    assert!(
+        line.starts_with("rtu:///dev/pts/") && line.ends_with("?baud=19200&parity=none&stop=1"),
+        "{line}"
+    );
+    assert!(converter.starts_with("rtu+tcp://127.0.0.1:") && !converter.ends_with(":0"), "{converter}");
+    assert_eq!(service.signal("INT"), (Some(0), String::new()));
+}
+
+#[test]
+fn a_line_that_cannot_be_is_one_sentence() {
+    busbar("emulate datakom-d --listen rtu:///dev/busbar-has-no-such-device")
+        .fails()
+        .prints("")
+        .says_in_one_sentence("there is no such device");
+    busbar("emulate datakom-d --listen rtu://pty?baud=14400").refuses().says_in_one_sentence(
+        "choose baud 2400, 4800, 9600, 19200, 38400, 57600 or 115200, parity none, stop 1",
+    );
+}
+
 #[test]
 fn emulate_takes_model_and_unit() {
     let mut service =

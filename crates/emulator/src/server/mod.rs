@@ -51,6 +51,9 @@ pub async fn start(config: Config) -> Result<Emulation, StartError> {
 /// # Errors
 /// As [`start`]; and two controllers have the same unit id.
 pub async fn start_together(configs: Vec<Config>, listen: Vec<Endpoint>) -> Result<Emulation, StartError> {
+    if configs.is_empty() {
+        return Err(StartError::NoController);
+    }
     let mut devices = Vec::new();
     for config in &configs {
         if !(config.speed > 0.0 && config.speed <= MAX_SPEED) {
@@ -194,7 +197,7 @@ impl Room<'_> {
                 return Err(StartError::LineSettings {
                     endpoint: self.endpoint.clone(),
                     key: profile.key.clone(),
-                    has: has.clone(),
+                    has: Box::new(has.clone()),
                 });
             }
         }

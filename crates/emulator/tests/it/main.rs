@@ -3,6 +3,8 @@
 
 mod golden;
 mod identities;
+#[cfg(target_os = "linux")]
+mod lines;
 mod pins;
 mod prop;
 mod push_buttons;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use busbar_emulator::{Config, Emulation, StartError, start};
+use busbar_emulator::{Config, Emulation, StartError, start, start_together};
 use busbar_link::Endpoint;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
@@ -250,7 +250,8 @@ async fn impossible_calls_are_refused() {
         let error = start(Config { speed, ..loopback(&[0]) }).await.unwrap_err();
         assert!(matches!(error, StartError::Speed { .. }), "{error:?}");
     }
-    let endpoint: Endpoint = "rtu+tcp://127.0.0.1:0".parse().unwrap();
+    assert_eq!(start_together(Vec::new(), Vec::new()).await.unwrap_err(), StartError::NoController);
+    let endpoint: Endpoint = "tls://127.0.0.1:0".parse().unwrap();
     let error = start(Config { listen: vec![endpoint.clone()], ..Config::default() }).await.unwrap_err();
     assert_eq!(error, StartError::Transport { endpoint });
 }
