@@ -155,6 +155,14 @@ impl Bank {
         Some(point.decode(registers, self.profile.wire.word_order).value?.as_number()?.as_f64())
     }
 
+    /// Sets every bit of a point, so that a test sees whether a panel stores it.
+    #[cfg(test)]
+    pub(crate) fn spoil(&mut self, point: &Point) {
+        if let Some(slots) = self.slots(point) {
+            slots.fill(0xFFFF);
+        }
+    }
+
     fn store(&mut self, address: u16, value: &Value) {
         let Some((index, point)) = self.indexed(address) else { return self.refuse() };
         if self.pinned[index] {

@@ -12,12 +12,13 @@ use crate::error::StartError;
 use crate::panel::Panel;
 use crate::pins;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
+use crate::smartgen_acc1700::{Acc1700, Model};
 
 /// The plant and the panel move in steps of this much simulated time, whatever the speed: so the same inputs at
 /// the same simulated times give the same registers.
 pub const STEP: Duration = Duration::from_millis(100);
 
-const IMITATED: [&str; 1] = ["datakom-d"];
+const IMITATED: [&str; 2] = ["datakom-d", "smartgen-acc1700"];
 
 /// A controller with its plant, its registers and the wire rules of its manual.
 ///
@@ -136,9 +137,26 @@ impl Device {
 }
 
 fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
-    if profile.key != "datakom-d" {
-        return Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() });
+    match profile.key.as_str() {
+        "datakom-d" => datakom_d(profile, config),
+        "smartgen-acc1700" => {
+            let model = Model::of(chosen(&profile.models, config, "ACC1700CAN")?);
+            Ok(Box::new(Acc1700::new(model, config.seed, config.story)))
+        }
+        _ => Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() }),
     }
+}
+
+/// The model asked for, as the profile writes it.
+fn chosen<'a>(models: &'a [String], config: &Config, default: &str) -> Result<&'a str, StartError> {
+    let wanted = config.model.as_deref().unwrap_or(default);
+    let known = models.iter().find(|model| model.eq_ignore_ascii_case(wanted));
+    known
+        .map(String::as_str)
+        .ok_or_else(|| StartError::UnknownModel { model: wanted.to_owned(), allowed: models.to_vec() })
+}
+
+fn datakom_d(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
     let wanted = config.model.as_deref().unwrap_or("D-500");
     // Every unit that its identity tells apart, with those the manual's title does not name.
     let known = profile.identity.as_ref().map_or(&[][..], |identity| &identity.models);
