@@ -112,6 +112,13 @@ impl Compressor {
         self.torque() / (0.7 + 0.3 * (self.engine.speed / RATED_RPM).min(1.0))
     }
 
+    /// V at the battery and at the charge alternator's D+ terminal: chargers give less the warmer it is.
+    pub(crate) fn voltages(&self) -> [f64; 2] {
+        let less = 0.012 * (self.intake - 21.0);
+        let charging = if self.engine.is_running() { less } else { 0.0 };
+        [self.battery.voltage - less, self.battery.charge_input - charging]
+    }
+
     /// Percent in the expansion tank, which hot coolant fills.
     pub(crate) fn coolant_level(&self) -> f64 {
         (84.0 + 0.12 * (self.engine.coolant - 40.0)).clamp(0.0, 100.0)

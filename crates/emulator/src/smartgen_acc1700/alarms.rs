@@ -158,9 +158,9 @@ const WATCHES: [Watch; 23] = [
     watch(20, 1, 1, |v| v.watched(below(v.plant.engine.speed, 800.0, 820.0))),
     watch(20, 3, 0, |v| when(v.plant.filter.needs_a_person())),
     watch(20, 8, 0, |v| when(v.sequence.status() == Status::StopFailure)),
-    watch(20, 9, 10, |v| v.watched(below(v.plant.battery.charge_input, 24.0, 25.0))),
-    watch(20, 10, 5, |v| above(v.plant.battery.voltage, 30.0, 29.5)),
-    watch(20, 11, 10, |v| below(v.plant.battery.voltage, 23.5, 24.0)),
+    watch(20, 9, 10, |v| v.watched(below(charger(v.plant), 24.0, 25.0))),
+    watch(20, 10, 5, |v| above(battery(v.plant), 30.0, 29.5)),
+    watch(20, 11, 10, |v| below(battery(v.plant), 23.5, 24.0)),
     watch(21, 1, 3, |v| above(v.plant.engine.coolant, 99.0, 97.0)),
     watch(21, 2, 10, |v| below(v.plant.engine.coolant, 0.0, 2.0)),
     watch(21, 6, 2, |v| v.watched(below(oil_pressure(v.plant), 140.0, 160.0))),
@@ -169,6 +169,14 @@ const WATCHES: [Watch; 23] = [
     watch(24, 2, 2, |v| when(v.inputs.fuel_low)),
     watch(33, 4, 0, |v| when(v.inputs.door_open)),
 ];
+
+fn battery(plant: &Compressor) -> f64 {
+    plant.voltages()[0]
+}
+
+fn charger(plant: &Compressor) -> f64 {
+    plant.voltages()[1]
+}
 
 /// kPa.
 fn oil_pressure(plant: &Compressor) -> f64 {

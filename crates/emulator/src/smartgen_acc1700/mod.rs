@@ -18,6 +18,9 @@
 //!   engine temperature and oil pressure, sensor 1 is not fitted and 2 is the pressure lost across the oil separator. An
 //!   ACC1700 has 1 and 2 for temperature and oil pressure, and none of what only an ECU knows;
 //! - no ECU here measures the coolant's pressure;
+//! - the particle filter asks (44.1) when it is full, burns (44.3, 44.7) as soon as the exhaust is hot, wants a person (20.3,
+//!   44.5) when it never is, and fails (44.0) in the end. Manual heating (0.14), inhibition (44.2), response (44.4) and engine
+//!   fault (44.9) never show yet;
 //! - maintenance 1 to 8 warn when their time is over, 9 and 10 indicate, none stops the engine;
 //! - events are starts, stops and new alarms; their number ends at 99.
 

@@ -157,8 +157,7 @@ fn ecu(unit: &Acc1700, bank: &mut Bank) {
 fn measurements(unit: &Acc1700, bank: &mut Bank) {
     let plant = &unit.plant;
     bank.number(50, plant.engine.speed);
-    bank.number(51, plant.battery.voltage);
-    bank.number(52, plant.battery.charge_input);
+    bank.numbers(51, 1, plant.voltages());
     let values = [
         plant.engine.coolant,
         plant.engine.oil_pressure * 100.0,
