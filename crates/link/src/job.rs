@@ -92,6 +92,15 @@ impl Ask {
         matches!(self, Self::Write(_))
     }
 
+    /// Bytes of the PDUs of the request and of its answer.
+    pub(crate) fn pdus(&self) -> (usize, usize) {
+        match self {
+            Self::Holding { count, .. } | Self::Input { count, .. } => (5, 2 + 2 * usize::from(*count)),
+            Self::Write(Write::Registers { values, .. }) => (6 + 2 * values.len(), 5),
+            Self::Write(_) => (5, 5),
+        }
+    }
+
     pub(crate) fn request(&self) -> Request<'_> {
         match *self {
             Self::Holding { address, count } => Request::ReadHoldingRegisters { address, count },

@@ -13,11 +13,16 @@
 //! - **Commands go first**, then what a person waits for, then polling ([`Priority`]).
 //!
 //! Inside, `wire` holds every rule as a pure state machine that is given the time; `shared` puts it and the connection
-//! behind one lock; `task` connects and keeps time.
+//! behind one lock; `task` connects and keeps time. `stream` is the connection, whatever it is made of; on RTU wires
+//! `echo` stands between it and the rules.
 
+mod clock;
+mod echo;
 mod endpoint;
 mod error;
+mod heard;
 mod job;
+mod line;
 mod link;
 mod options;
 mod port;
@@ -26,12 +31,14 @@ mod serial;
 mod shared;
 mod silence;
 mod statistics;
+mod stream;
 mod task;
 mod trace;
 mod wire;
 
 pub use endpoint::{Endpoint, EndpointError, EndpointProblem, Parity, Serial, StopBits};
 pub use error::{Cause, Fault, LinkError, Loss, OpenError, Outage};
+pub use heard::Heard;
 pub use job::{Priority, Write};
 pub use link::{Link, WireState};
 pub use options::{Backoff, Options};

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::{Duration, SystemTime};
 
-use busbar_modbus::Framing;
 use tokio::runtime::Handle;
 use tokio::sync::watch;
 
 use crate::endpoint::Endpoint;
 use crate::error::{LinkError, OpenError, Outage};
 use crate::job::{Ask, Job, Outcome, Priority, Write};
+use crate::line::Line;
 use crate::options::Options;
 use crate::queue::Ticket;
 use crate::shared::Shared;
@@ -33,21 +33,25 @@ impl Link {
     /// Opens a wire and starts to connect. Whether it is up is seen from [`Self::state`] or the first request.
     ///
     /// # Errors
-    /// [`OpenError::NotSpoken`] for endpoints other than `tcp://`, [`OpenError::NoPort`] for port 0,
+    /// [`OpenError::NotSpoken`] for `tls://` endpoints, [`OpenError::NoPort`] for port 0,
     /// [`OpenError::NoRuntime`] outside a tokio runtime.
     pub fn open(endpoint: Endpoint, options: Options) -> Result<Self, OpenError> {
-        match endpoint {
-            Endpoint::Tcp { port: 0, .. } => return Err(OpenError::NoPort { endpoint }),
-            Endpoint::Tcp { .. } => {}
-            _ => return Err(OpenError::NotSpoken { endpoint }),
-        }
+        let line = match &endpoint {
+            Endpoint::Tcp { port: 0, .. } | Endpoint::RtuTcp { port: 0, .. } => {
+                return Err(OpenError::NoPort { endpoint });
+            }
+            Endpoint::Tcp { .. } => Line::tcp(),
+            Endpoint::RtuTcp { .. } => Line::tunnelled(),
+            Endpoint::Rtu { serial, .. } => Line::rtu(serial),
+            Endpoint::Tls { .. } => return Err(OpenError::NotSpoken { endpoint }),
+        };
         let runtime = Handle::try_current().map_err(|_| OpenError::NoRuntime)?;
 
         let endpoint = Arc::new(endpoint);
-        let wire = Wire::new(Arc::clone(&endpoint), Framing::Tcp, &options);
-        let shared = Arc::new(Shared::new(wire, options.trace.is_some()));
+        let wire = Wire::new(Arc::clone(&endpoint), line, &options);
+        let shared = Arc::new(Shared::new(wire, line, options.trace.is_some()));
         let timeout = options.timeout;
-        runtime.spawn(Task::new(Arc::clone(&shared), Arc::clone(&endpoint), options));
+        runtime.spawn(Task::new(Arc::clone(&shared), Arc::clone(&endpoint), line, options));
         let owner = Arc::new(Owner { shared, endpoint });
         Ok(Self { owner, priority: Priority::Person, timeout, short: false })
     }

@@ -33,6 +33,8 @@ pub struct Statistics {
     pub crc_errors: u64,
     /// Bytes that belong to no frame.
     pub garbage_bytes: u64,
+    /// Our own requests that the adapter or converter sent back (RTU).
+    pub echoes: u64,
     /// Connections made after the first one.
     pub reconnects: u64,
     /// Bytes sent.

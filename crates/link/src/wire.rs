@@ -7,11 +7,13 @@ use std::sync::Arc;
 use std::task::{Poll, Waker};
 use std::time::Duration;
 
-use busbar_modbus::{Client, Framing, Progress, Response};
+use busbar_modbus::{Client, Progress, Response};
 
 use crate::endpoint::Endpoint;
 use crate::error::{Cause, LinkError, Loss, Outage};
+use crate::heard::Ear;
 use crate::job::{Job, Outcome, Priority};
+use crate::line::Line;
 use crate::options::{Backoff, Options};
 use crate::queue::{Entry, Place, Queue, Ticket};
 use crate::silence::Silence;
@@ -29,6 +31,7 @@ const PROVEN_ANSWERS: u64 = 100;
 #[derive(Debug)]
 pub(crate) struct Wire {
     endpoint: Arc<Endpoint>,
+    line: Line,
     rules: Rules,
     client: Client,
     queue: Queue,
@@ -52,16 +55,17 @@ pub(crate) struct Wire {
 }
 
 impl Wire {
-    pub(crate) fn new(endpoint: Arc<Endpoint>, framing: Framing, options: &Options) -> Self {
+    pub(crate) fn new(endpoint: Arc<Endpoint>, line: Line, options: &Options) -> Self {
         Self {
             endpoint,
+            line,
             rules: Rules {
                 spacing: options.spacing.min(LONGEST_WAIT),
                 retries: options.retries,
                 timeouts_to_drop: options.timeouts_to_drop,
                 backoff: options.backoff,
             },
-            client: Client::new(framing),
+            client: Client::new(line.framing),
             queue: Queue::new(options.queue),
             phase: Phase::Connecting { trying: false, since: Duration::ZERO },
             exchange: None,
@@ -197,6 +201,16 @@ impl Wire {
         self.enter(Phase::Connecting { trying: false, since });
     }
 
+    /// RTU: so many bytes were on the line, whatever they are, and how long the echo of our own request is if they end
+    /// one. The line has to be silent after them.
+    pub(crate) fn heard(&mut self, now: Duration, bytes: usize, echo: Option<usize>) {
+        self.statistics.echoes += u64::from(echo.is_some());
+        self.earliest = self.earliest.max(now + self.line.silence);
+        if let Some(exchange) = &mut self.exchange {
+            exchange.ear.hears(bytes, echo);
+        }
+    }
+
     /// Bytes came.
     pub(crate) fn received(&mut self, now: Duration, bytes: &[u8], wakes: &mut Vec<Waker>) {
         self.statistics.bytes_received += bytes.len() as u64;
@@ -270,7 +284,7 @@ impl Wire {
         wakes: &mut Vec<Waker>,
     ) -> Option<Duration> {
         let free = matches!(self.phase, Phase::Connected) && self.exchange.is_none();
-        if self.closed || self.hang_up || !free || now < self.earliest {
+        if self.closed || self.hang_up || !free || now < self.earliest() {
             return None;
         }
         while let Some(place) = self.queue.pop(now) {
@@ -310,8 +324,13 @@ impl Wire {
         match self.start_next(now, out, wakes) {
             Some(until) => Step::Send(Some(until)),
             None if self.queue.is_empty() => Step::Wait(None),
-            None => Step::Wait(Some(self.earliest)),
+            None => Step::Wait(Some(self.earliest())),
         }
+    }
+
+    /// When the next request may leave.
+    fn earliest(&self) -> Duration {
+        self.earliest.max(self.client.quiet_until().unwrap_or_default())
     }
 
     fn start(&mut self, now: Duration, place: Place, out: &mut Vec<u8>) -> Result<(), LinkError> {
@@ -319,7 +338,10 @@ impl Wire {
             return Err(LinkError::Closed);
         };
         let job = &entry.job;
-        self.client.start(now, job.unit, &job.ask.request(), job.timeout, out)?;
+        let (asked, answered) = job.ask.pdus();
+        let timeout = job.timeout + self.line.time(self.line.frame(asked) + self.line.frame(answered));
+        self.client.start(now, job.unit, &job.ask.request(), timeout, out)?;
+        self.earliest = now + self.line.time(out.len() as u64) + self.line.silence;
         if job.short {
             self.client.accept_short();
         }
@@ -335,6 +357,7 @@ impl Wire {
             tries: entry.tries,
             started: now,
             sent: Sent::Whole,
+            ear: Ear::new(self.client.counters()),
         });
         Ok(())
     }
@@ -346,7 +369,7 @@ impl Wire {
         };
         let Some(exchange) = self.exchange.take() else { return };
         self.silence.answered(exchange.unit);
-        self.earliest = now + self.rules.spacing;
+        self.earliest = self.earliest.max(now + self.rules.spacing);
         self.statistics.answers += 1;
         self.statistics.latency.record(now.saturating_sub(exchange.started));
 
@@ -370,13 +393,14 @@ impl Wire {
 
     fn timed_out(&mut self, now: Duration, wakes: &mut Vec<Waker>) {
         self.statistics.timeouts += 1;
-        self.earliest = now + self.rules.spacing;
+        self.earliest = self.earliest.max(now + self.rules.spacing);
         if self.exchange.as_ref().is_some_and(|exchange| exchange.sent != Sent::Whole) {
             // Half a frame is in the connection: nothing may follow it.
             return self.hang_up(now, Cause::Stuck, wakes);
         }
         let Some(exchange) = self.exchange.take() else { return };
         let Exchange { place, unit, timeout: after, tries, .. } = exchange;
+        let heard = exchange.ear.judge(self.line.is_rtu(), self.client.counters());
         let was_silent = tries == 1 && self.silence.is_silent(unit);
         self.silence.timed_out(unit);
         let waiting = self.queue.waiting().map(|entry| entry.job.unit);
@@ -387,7 +411,7 @@ impl Wire {
             let loss = Loss::TimedOut { after };
             self.queue.finish(place, Err(LinkError::Lost { unit, loss }), wakes);
         } else if !again || !self.retry(&exchange) {
-            self.queue.finish(place, Err(LinkError::Timeout { unit, after, tries }), wakes);
+            self.queue.finish(place, Err(LinkError::Timeout { unit, after, tries, heard }), wakes);
         }
         if dead {
             let requests = self.silence.timeouts();
@@ -527,6 +551,7 @@ struct Exchange {
     tries: u8,
     started: Duration,
     sent: Sent,
+    ear: Ear,
 }
 
 impl Exchange {

@@ -4,9 +4,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::task::Wake;
 
 use super::*;
+use crate::heard::Heard;
 use crate::job::{Ask, Write};
 
 pub(super) const TIMEOUT: u64 = 1000;
+pub(super) const NOTHING: Heard = Heard::Nothing { serial: false };
 const ADDRESS: u16 = 10246;
 
 pub(super) fn ms(millis: u64) -> Duration {
@@ -27,7 +29,7 @@ impl Script {
 
     pub(super) fn with(options: Options) -> Self {
         Self {
-            wire: Wire::new(endpoint(), Framing::Tcp, &options),
+            wire: Wire::new(endpoint(), Line::tcp(), &options),
             out: Vec::new(),
             wakes: Vec::new(),
             woken: Arc::default(),
