@@ -341,7 +341,6 @@ impl Wire {
         let (asked, answered) = job.ask.pdus();
         let timeout = job.timeout + self.line.time(self.line.frame(asked) + self.line.frame(answered));
         self.client.start(now, job.unit, &job.ask.request(), timeout, out)?;
-        self.earliest = now + self.line.time(out.len() as u64) + self.line.silence;
         if job.short {
             self.client.accept_short();
         }
