@@ -551,6 +551,10 @@ mod pace;
 #[cfg(test)]
 mod promises;
 #[cfg(test)]
+mod rtu;
+#[cfg(test)]
 mod script;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod units;

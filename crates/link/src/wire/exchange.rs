@@ -38,6 +38,7 @@ pub(super) struct Exchange {
     limit: Duration,
     spacing: Duration,
     started: Duration,
+    deadline: Duration,
     /// When silence will have ended what has come so far, if that does not look like the answer.
     silence: Option<Duration>,
 }
@@ -45,6 +46,11 @@ pub(super) struct Exchange {
 impl Exchange {
     pub(super) fn unit(&self) -> u8 {
         self.question.unit
+    }
+
+    /// Until when its answer may come.
+    fn horizon(&self) -> Duration {
+        self.deadline + self.limit.saturating_mul(HORIZON)
     }
 
     /// Whether it is a write of which the device may know.
@@ -115,6 +121,7 @@ impl Wire {
             limit,
             spacing: job.spacing,
             started: now,
+            deadline: now + patience,
             silence: None,
         });
         Ok(now + patience)
@@ -236,8 +243,7 @@ impl Wire {
             self.fulfil(&exchange, wakes);
         }
         if self.line.is_rtu() && !is_exception {
-            let until = horizon(now, &exchange);
-            self.doubts.answered(now, &exchange.question, until);
+            self.doubts.answered(now, &exchange.question, exchange.horizon());
         }
     }
 
@@ -315,7 +321,7 @@ impl Wire {
 
     /// The answer may still come, and must not be taken for another.
     fn doubt(&mut self, now: Duration, exchange: &Exchange) {
-        self.doubts.lost(now, exchange.question, horizon(now, exchange));
+        self.doubts.lost(now, exchange.question, exchange.horizon());
     }
 
     /// Ends or requeues the exchange that a drop cut off.
@@ -360,10 +366,4 @@ impl Wire {
 fn time_on_line(line: &Line, question: &Question) -> Duration {
     let pdus = [question.request_pdu(), question.answer_pdu()];
     line.time(pdus.into_iter().map(|pdu| line.frame(pdu)).sum())
-}
-
-/// Until when the answer to an exchange may come.
-fn horizon(now: Duration, exchange: &Exchange) -> Duration {
-    let deadline = now.max(exchange.started + exchange.timeout);
-    deadline + exchange.limit.saturating_mul(HORIZON)
 }
