@@ -47,6 +47,8 @@ pub(crate) struct Wire {
     earliest: Duration,
     units: Units,
     silence: Silence,
+    /// When the first request left since anybody answered.
+    unanswered_since: Option<Duration>,
     doubts: Doubts,
     /// Exchanges started, which says what was served last.
     started: u64,
@@ -90,6 +92,7 @@ impl Wire {
             earliest: Duration::ZERO,
             units: Units::default(),
             silence: Silence::default(),
+            unanswered_since: None,
             doubts: Doubts::default(),
             started: 0,
             failures: 0,
@@ -200,6 +203,7 @@ impl Wire {
     pub(crate) fn connected(&mut self, now: Duration) {
         self.client.reset();
         self.silence.begin();
+        self.unanswered_since = None;
         self.connections += 1;
         self.connected_at = now;
         self.answers = 0;

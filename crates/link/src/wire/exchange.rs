@@ -223,6 +223,7 @@ impl Wire {
 
         self.answers += 1;
         self.silence.answered(exchange.unit());
+        self.unanswered_since = None;
         let unit = self.units.record(exchange.unit());
         unit.answered(is_certain.then_some(reaction));
         unit.counts.answers += 1;
@@ -284,7 +285,10 @@ impl Wire {
         self.units.record(unit).missed(exchange.started);
         let waiting = self.queue.waiting().map(|entry| entry.job.unit);
         let is_dead = self.silence.is_dead(self.rules.timeouts_to_drop, waiting);
-        let dead = is_dead && !self.line.is_serial();
+        // Short time-outs come fast one after the other, and a connection may stall for longer than that.
+        let since = *self.unanswered_since.get_or_insert(exchange.started);
+        let is_long = now.saturating_sub(since) >= exchange.limit.saturating_mul(self.rules.timeouts_to_drop);
+        let dead = is_dead && is_long && !self.line.is_serial();
         // Who was silent before gets one try while others answer.
         let again = !was_silent || dead || !self.has_slots();
         if exchange.question.write {

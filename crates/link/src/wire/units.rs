@@ -71,7 +71,9 @@ fn a_unit_has_its_pause_and_others_use_the_time() {
 
 #[test]
 fn a_read_waits_as_long_as_its_unit_usually_takes() {
-    let mut script = adaptive();
+    let options = Options { retries: 0, timeouts_to_drop: 100, ..Options::default() };
+    let mut script = Script::on(Line::tcp(), options);
+    script.connect(0);
     for round in 0..30 {
         for (unit, takes) in [(1, 2), (2, 400)] {
             let now = 20_000 * round + 100 * u64::from(unit);
@@ -195,6 +197,25 @@ fn where_nobody_answers_there_is_nobody_to_protect() {
     script.connect(3200);
     poll(&mut script, 3200, 1).unwrap();
     assert_eq!(script.asks(3200).2, ms(1000));
+}
+
+#[test]
+fn a_connection_that_stalls_is_not_dead_at_once() {
+    let mut script = adaptive();
+    let mut now = 0;
+    poll(&mut script, now, 1).unwrap();
+    serve(&mut script, now);
+    let mut waited = Vec::new();
+    loop {
+        poll(&mut script, now, 1).unwrap();
+        let patience = script.asks(now).2.as_millis();
+        waited.push(patience);
+        now += u64::try_from(patience).unwrap();
+        if script.step(now) == Step::Disconnect {
+            break;
+        }
+    }
+    assert_eq!(waited, [200, 400, 800, 1000, 1000], "three whole time-outs at least");
 }
 
 fn together(spacing: u64) -> Job {
