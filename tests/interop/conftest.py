@@ -48,6 +48,13 @@ def busbar(*arguments):
     return Outcome(done.returncode, done.stdout, done.stderr)
 
 
+def ended_by_ctrl_c(process):
+    """Presses Ctrl-C and sees to it that the process ends with 0."""
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, err
+
+
 @contextlib.contextmanager
 def emulation(*arguments, key="datakom-d"):
     """An imitated controller; yields its host and port, and sees to it that Ctrl-C ends it with 0."""
@@ -62,9 +69,7 @@ def emulation(*arguments, key="datakom-d"):
         assert url.startswith("tcp://127.0.0.1:"), f"no URL but {url!r}: {process.stderr.read() if not url else ''}"
         host, _, port = url.removeprefix("tcp://").rpartition(":")
         yield host, int(port)
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0, err
+        ended_by_ctrl_c(process)
     finally:
         process.kill()
         process.communicate()
