@@ -237,7 +237,7 @@ impl From<&io::Error> for Cause {
     }
 }
 
-fn io_sentence(kind: io::ErrorKind, code: Option<i32>) -> String {
+pub(crate) fn io_sentence(kind: io::ErrorKind, code: Option<i32>) -> String {
     match code {
         Some(code) => io::Error::from_raw_os_error(code).to_string(),
         None => kind.to_string(),
