@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use busbar_emulator::Config;
-use busbar_link::{Endpoint, Link, Options};
+use busbar_link::{Endpoint, Link, Options, Serial, SerialPort};
 use busbar_modbus::{Framing, Registers, Request, Response, Server};
 use busbar_profile::Image;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -31,6 +31,8 @@ pub(crate) fn run(role: &[&str]) -> Result<(), Box<dyn Error>> {
         ["busbar", "server"] => runtime.block_on(serve()),
         ["emulator", "server"] => runtime.block_on(emulate()),
         ["tokio-modbus", "server"] => runtime.block_on(serve_theirs()),
+        ["busbar", "serial", path, count] => runtime.block_on(read_line(path, count.parse()?)),
+        ["tokio-modbus", "serial", path, count] => runtime.block_on(read_line_theirs(path, count.parse()?)),
         [name, "fleet", port, devices, settle, run] => {
             let fleet = Fleet {
                 address: SocketAddr::from(([127, 0, 0, 1], port.parse()?)),
@@ -195,6 +197,25 @@ async fn follow_theirs(address: SocketAddr, mut beat: Beat, counted: Arc<Counted
         }
         beat.next(&counted).await;
     }
+}
+
+async fn read_line(path: &str, count: usize) -> Result<(), Box<dyn Error>> {
+    let link = Link::open(format!("rtu://{path}?baud=9600").parse()?, Options::default())?;
+    let mut registers = Vec::new();
+    for _ in 0..count {
+        link.read_registers_into(UNIT, 3, ADDRESS, COUNT, &mut registers).await?;
+    }
+    Ok(())
+}
+
+/// On our port: theirs is the protocol.
+async fn read_line_theirs(path: &str, count: usize) -> Result<(), Box<dyn Error>> {
+    let port = SerialPort::open(path, &Serial::default())?;
+    let mut context = tokio_modbus::client::rtu::attach_slave(port, theirs::Slave(UNIT));
+    for _ in 0..count {
+        context.read_holding_registers(ADDRESS, COUNT).await??;
+    }
+    Ok(())
 }
 
 /// The smallest server on `busbar_modbus::Server`: registers that hold their address.

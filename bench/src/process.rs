@@ -21,6 +21,15 @@ pub(crate) fn on_one_processor(program: impl AsRef<OsStr>) -> Result<Command, Bo
     Ok(command)
 }
 
+/// The interpreter in which `make setup` installs pymodbus.
+pub(crate) fn python() -> Result<Command, Box<dyn Error>> {
+    let interpreter = concat!(env!("CARGO_MANIFEST_DIR"), "/../.venv/bin/python");
+    match fs::exists(interpreter)? {
+        true => Ok(Command::new(interpreter)),
+        false => Err("pymodbus is not installed: run make setup first".into()),
+    }
+}
+
 /// A child that is killed when it is dropped.
 pub(crate) struct Process {
     child: Child,
