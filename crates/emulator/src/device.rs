@@ -12,12 +12,13 @@ use crate::error::StartError;
 use crate::panel::Panel;
 use crate::pins;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
+use crate::smartgen_hat821si::Hat821si;
 
 /// The plant and the panel move in steps of this much simulated time, whatever the speed: so the same inputs at
 /// the same simulated times give the same registers.
 pub const STEP: Duration = Duration::from_millis(100);
 
-const IMITATED: [&str; 1] = ["datakom-d"];
+const IMITATED: [&str; 2] = ["datakom-d", "smartgen-hat821si"];
 
 /// A controller with its plant, its registers and the wire rules of its manual.
 ///
@@ -136,9 +137,17 @@ impl Device {
 }
 
 fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
-    if profile.key != "datakom-d" {
-        return Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() });
+    match profile.key.as_str() {
+        "datakom-d" => datakom_d(profile, config),
+        "smartgen-hat821si" => {
+            only_model(profile, config)?;
+            Ok(Box::new(Hat821si::new(config.seed, config.story)))
+        }
+        _ => Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() }),
     }
+}
+
+fn datakom_d(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
     let wanted = config.model.as_deref().unwrap_or("D-500");
     // Every unit that its identity tells apart, with those the manual's title does not name.
     let known = profile.identity.as_ref().map_or(&[][..], |identity| &identity.models);
@@ -147,4 +156,14 @@ fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartErro
         return Err(StartError::UnknownModel { model: wanted.to_owned(), allowed });
     };
     Ok(Box::new(DatakomD::new(&known.model, known.value, config.seed, config.story)))
+}
+
+/// A family whose models do not differ: the one asked for has to be one of them.
+fn only_model(profile: &Profile, config: &Config) -> Result<(), StartError> {
+    match &config.model {
+        Some(model) if !profile.models.iter().any(|known| known.eq_ignore_ascii_case(model)) => {
+            Err(StartError::UnknownModel { model: model.clone(), allowed: profile.models.clone() })
+        }
+        _ => Ok(()),
+    }
 }

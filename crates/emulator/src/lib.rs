@@ -18,6 +18,7 @@ mod plant;
 mod random;
 mod rules;
 mod server;
+mod smartgen_hat821si;
 mod waveform;
 
 pub use config::Config;

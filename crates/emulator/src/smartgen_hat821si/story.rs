@@ -1,0 +1,58 @@
+//! Some days at the demonstration site in five minutes, told again and again: source 1 fails and comes back, a feeder
+//! trips and somebody comes to put it right.
+
+use super::plant::Trouble;
+
+/// Seconds until the next chapter.
+const CHAPTER: f64 = 300.0;
+
+/// What happens at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scene {
+    /// What ails source 1.
+    pub(super) source_1: Trouble,
+    /// There is a short circuit behind load switch 2-7.
+    pub(super) feeder_fault: bool,
+    /// Somebody stands at the controller and has set it to local.
+    pub(super) attended: bool,
+    /// He has repaired the feeder, and switches on again.
+    pub(super) repaired: bool,
+}
+
+impl Scene {
+    pub(super) const NOTHING: Self =
+        Self { source_1: Trouble::Nothing, feeder_fault: false, attended: false, repaired: false };
+
+    /// The scene at `time` seconds since power-on.
+    pub(super) fn at(time: f64) -> Self {
+        let moment = time.rem_euclid(CHAPTER);
+        // Each chapter has another trouble.
+        let trouble = match (time / CHAPTER) as u64 % 3 {
+            0 => Trouble::Blackout,
+            1 => Trouble::PhaseLost,
+            _ => Trouble::Sag,
+        };
+        Self {
+            source_1: if (25.0..70.0).contains(&moment) { trouble } else { Trouble::Nothing },
+            feeder_fault: (150.0..180.0).contains(&moment),
+            attended: (185.0..200.0).contains(&moment),
+            repaired: (195.0..200.0).contains(&moment),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trouble_alternates_with_quiet() {
+        assert_eq!(Scene::at(0.0), Scene::NOTHING);
+        assert_eq!(Scene::at(30.0).source_1, Trouble::Blackout);
+        assert_eq!(Scene::at(330.0).source_1, Trouble::PhaseLost);
+        assert_eq!(Scene::at(630.0).source_1, Trouble::Sag);
+        assert_eq!(Scene::at(930.0), Scene::at(30.0));
+        assert!(Scene::at(160.0).feeder_fault && Scene::at(190.0).attended && Scene::at(196.0).repaired);
+        assert_eq!(Scene::at(250.0), Scene::NOTHING);
+    }
+}
