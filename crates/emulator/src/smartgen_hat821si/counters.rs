@@ -15,10 +15,14 @@ pub(super) struct SupplyTime {
 }
 
 impl SupplyTime {
-    pub(super) fn new(random: &mut Random) -> Self {
+    /// `own` is how long the section's own source has fed it; the rest came over the tie.
+    pub(super) fn new(own: Duration, random: &mut Random) -> Self {
         let mut seconds = |low, high| Duration::from_secs(random.between(low, high) as u64);
-        let (present, last) = (seconds(3.0e5, 2.0e6), seconds(3.0e5, 4.0e6));
-        Self { present, last, total: present + last + seconds(2.0e7, 9.0e7) }
+        Self {
+            present: seconds(3.0e5, 2.0e6),
+            last: seconds(3.0e5, 4.0e6),
+            total: own + seconds(2.0e5, 2.0e6),
+        }
     }
 
     pub(super) fn step(&mut self, dt: Duration, alive: bool) {
@@ -67,7 +71,7 @@ mod tests {
     #[test]
     fn a_gap_ends_one_supply_and_begins_another() {
         let second = Duration::from_secs(1);
-        let mut time = SupplyTime::new(&mut Random::new(1));
+        let mut time = SupplyTime::new(second * 9_000_000, &mut Random::new(1));
         let before = time.clone();
         time.step(second, true);
         assert_eq!((time.present, time.total), (before.present + second, before.total + second));

@@ -129,7 +129,7 @@ impl Hat821si {
             alarms: 0,
             horn: Duration::ZERO,
             source_supply,
-            load_supply: [SupplyTime::new(&mut random), SupplyTime::new(&mut random)],
+            load_supply: source_supply.map(|own| SupplyTime::new(own, &mut random)),
             story,
             scene: Scene::NOTHING,
         }
@@ -229,6 +229,7 @@ impl Hat821si {
         let scene = Scene::at(self.passed.as_secs_f64());
         let before = std::mem::replace(&mut self.scene, scene);
         self.plant.sources[0].trouble = scene.source_1;
+        self.plant.switches[Switch::Qtie as usize].jammed = scene.tie_jammed;
         self.local = scene.attended;
         let (section, feeder) = STORY_FEEDER;
         if scene.feeder_fault && !before.feeder_fault {

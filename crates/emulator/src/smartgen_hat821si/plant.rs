@@ -95,12 +95,16 @@ impl Plant {
     /// A plant whose switches stand like this.
     pub(super) fn new(seed: u64, positions: Positions) -> Self {
         let mut random = Random::new(seed ^ 0x0821);
+        let [first, second] = [0; 2].map(|_| random.between(90.0, 210.0) as u32);
+        let mechanism = |switch, closings| Mechanism::new(positions.is_closed(switch), closings);
         let mut plant = Self {
             sources: [Source::new(&mut random), Source::new(&mut random)],
-            switches: Switch::ALL.map(|switch| {
-                let closings = random.between(180.0, 420.0) as u32;
-                Mechanism::new(positions.is_closed(switch), closings)
-            }),
+            // The tie has closed for each of the times that a source was lost.
+            switches: [
+                mechanism(Switch::Qs1, first),
+                mechanism(Switch::Qtie, first + second),
+                mechanism(Switch::Qs2, second),
+            ],
             sections: [Section::new(&mut random), Section::new(&mut random)],
             random,
         };
@@ -188,7 +192,7 @@ impl Mechanism {
 pub(super) struct Source {
     pub(super) feed: Feed,
     /// Degrees of phase A against a clock of exactly 50 Hz.
-    pub(super) angle: f64,
+    angle: f64,
     pub(super) energy: Energy,
     pub(super) trouble: Trouble,
     level: Drift,
@@ -213,9 +217,14 @@ impl Source {
         }
     }
 
-    /// Whether any phase has a voltage that its frequency and angle can be measured from.
+    /// Whether any phase has a voltage that a frequency and an angle can be measured from.
     pub(super) fn is_present(&self) -> bool {
-        self.parts.iter().any(|part| *part > 0.1)
+        (0..3).any(|phase| self.has_phase(phase))
+    }
+
+    /// Whether that phase, 0 to 2, has one.
+    pub(super) fn has_phase(&self, phase: usize) -> bool {
+        self.parts[phase] > 0.1
     }
 
     /// Degrees of each phase, 0 to 360.

@@ -8,7 +8,6 @@ use super::Hat821si;
 use super::counters::{calendar, parts};
 use super::loads::Loads;
 use super::plant::{Drive, FEEDERS, RATED_CURRENT, Source, Switch};
-use super::source::Supervision;
 
 /// Words whose bits are all faults.
 const FAULTS: [u16; 7] = [503, 523, 524, 525, 526, 527, 528];
@@ -22,7 +21,7 @@ pub(super) fn registers(unit: &Hat821si, bank: &mut Bank) {
     let [first, second] = &unit.plant.sources;
     source(first, &S1, bank);
     source(second, &S2, bank);
-    between(first, second, bank);
+    between(bank);
     state(unit, bank);
     alarms(unit, bank);
     load_switches(unit, bank);
@@ -109,9 +108,11 @@ fn source(source: &Source, at: &SourceRegisters, bank: &mut Bank) {
     let feed = &source.feed;
     bank.numbers(at.line_voltage, 1, feed.line_voltage());
     bank.numbers(at.phase_voltage, 1, feed.voltage);
-    match source.is_present() {
-        true => bank.numbers(at.angle, 1, source.angles()),
-        false => (at.angle..at.angle + 3).for_each(|address| bank.absent(address)),
+    for ((phase, address), degrees) in (0..).zip(at.angle..).zip(source.angles()) {
+        match source.has_phase(phase) {
+            true => bank.number(address, degrees),
+            false => bank.absent(address),
+        }
     }
     bank.number(at.frequency, feed.frequency);
     bank.number(at.unbalance, 1000.0 * unbalance(feed.line_voltage()));
@@ -144,15 +145,17 @@ fn unbalance(volts: [f64; 3]) -> f64 {
     if mean > 1.0 { farthest / mean } else { 0.0 }
 }
 
-/// Differences of what the two meters show.
-fn between(first: &Source, second: &Source, bank: &mut Bank) {
-    let [volts_1, volts_2] = [first, second].map(|source| source.feed.line_voltage()[0].round());
-    bank.number(1030, volts_1 - volts_2);
-    let [hertz_1, hertz_2] = [first, second].map(|source| (100.0 * source.feed.frequency).round());
-    bank.number(1031, (hertz_1 - hertz_2) / 100.0);
-    let both = first.is_present() && second.is_present();
-    let apart = (first.angle - second.angle + 180.0).rem_euclid(360.0) - 180.0;
-    bank.number(1032, if both { apart } else { 0.0 });
+/// Differences of what the two meters show, pinned or not; 0 between angles that are not there.
+fn between(bank: &mut Bank) {
+    let difference = |bank: &Bank, first, second| {
+        bank.number_shown(first).zip(bank.number_shown(second)).map(|(first, second)| first - second)
+    };
+    let volts = difference(bank, S1.line_voltage, S2.line_voltage);
+    let hertz = difference(bank, S1.frequency, S2.frequency);
+    let degrees = difference(bank, S1.angle, S2.angle);
+    bank.number(1030, volts.unwrap_or(0.0).clamp(-32_768.0, 32_767.0));
+    bank.number(1031, hertz.unwrap_or(0.0).clamp(-100.0, 100.0));
+    bank.number(1032, degrees.map_or(0.0, |degrees| (degrees + 180.0).rem_euclid(360.0) - 180.0));
     // Nothing is synchronized: every transfer is open.
     bank.integer(1083, 0);
     bank.integer(1107, 0);

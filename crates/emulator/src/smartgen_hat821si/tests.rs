@@ -134,3 +134,22 @@ fn what_could_not_be_done_by_hand_is_not_tried_again_by_itself() {
     pass(&mut unit, 10);
     assert_eq!(digits(&unit), [1, 0, 1]);
 }
+
+#[test]
+fn every_point_is_stored() {
+    let profile = busbar_profile::builtin("smartgen-hat821si").unwrap();
+    let images = [0xA5A5, 0x5A5A].map(|word| {
+        let mut bank = Bank::new(profile);
+        bank.fill(word);
+        quiet().render(&mut bank);
+        assert_eq!(bank.refused(), 0);
+        bank
+    });
+    let order = profile.wire.word_order;
+    for point in profile.points.iter().filter(|point| point.access.is_readable()) {
+        let [one, other] = images
+            .each_ref()
+            .map(|bank| point.decode(bank.read(point.address, point.registers).unwrap(), order));
+        assert_eq!(one, other, "{} keeps what was there before", point.id);
+    }
+}

@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod golden;
+mod hat821si;
 mod identities;
 mod pins;
 mod prop;
