@@ -40,6 +40,19 @@ fn an_hour_obeys_physics_whatever_the_seed() {
     }
 }
 
+#[test]
+fn the_same_seed_and_inputs_give_the_same_registers_however_time_is_cut() {
+    let [mut fine, mut coarse, mut other] = [5, 5, 6].map(with_story);
+    for site in [&mut fine, &mut coarse, &mut other] {
+        send(site, 15032, ON);
+    }
+    (0..900).for_each(|_| fine.pass(TENTH));
+    coarse.pass_seconds(90);
+    other.pass_seconds(90);
+    assert_eq!(fine.image(), coarse.image());
+    assert_ne!(fine.image(), other.image());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
