@@ -13,12 +13,13 @@ use crate::panel::Panel;
 use crate::pins;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
 use crate::smartgen_acc1700::{Acc1700, Model};
+use crate::smartgen_hat821si::Hat821si;
 
 /// The plant and the panel move in steps of this much simulated time, whatever the speed: so the same inputs at
 /// the same simulated times give the same registers.
 pub const STEP: Duration = Duration::from_millis(100);
 
-const IMITATED: [&str; 2] = ["datakom-d", "smartgen-acc1700"];
+const IMITATED: [&str; 3] = ["datakom-d", "smartgen-hat821si", "smartgen-acc1700"];
 
 /// A controller with its plant, its registers and the wire rules of its manual.
 ///
@@ -142,6 +143,11 @@ fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartErro
         "smartgen-acc1700" => {
             let model = Model::of(chosen(&profile.models, config, "ACC1700CAN")?);
             Ok(Box::new(Acc1700::new(model, config.seed, config.story)))
+        }
+        "smartgen-hat821si" => {
+            // There is one.
+            chosen(&profile.models, config, "HAT821SI")?;
+            Ok(Box::new(Hat821si::new(config.seed, config.story)))
         }
         _ => Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() }),
     }

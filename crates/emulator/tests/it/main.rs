@@ -3,6 +3,7 @@
 
 mod acc1700;
 mod golden;
+mod hat821si;
 mod identities;
 mod pins;
 mod prop;
