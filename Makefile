@@ -14,7 +14,7 @@ demo: build
 test: setup lint test-web test-rust test-interop test-page
 
 ## figures: processor time, beside a bare C echo and other libraries in the same run
-bench:
+bench: .venv/.installed
 	$(CARGO) run --locked --release -p busbar-bench
 
 setup: web/node_modules/.installed .venv/.installed

@@ -67,6 +67,7 @@ static void serve(void) {
                 close(fd);
             } else if (count == REQUEST) {
                 memcpy(answer, buffer, 2);
+                answer[10] = buffer[1]; /* something that changes */
                 if (write(fd, answer, ANSWER) != ANSWER) fail("write");
             }
         }

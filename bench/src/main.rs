@@ -4,25 +4,34 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its table")]
 
 mod decode;
+mod fleet;
 mod peers;
 mod process;
+mod serial;
 mod wire;
 
 use std::process::ExitCode;
 
 const USAGE: &str = "\
-usage: busbar-bench [decode | wire [--rounds N] [--seconds S]]
+usage: busbar-bench [decode | wire [--rounds N] [--seconds S] | fleet [--seconds S] | serial [--exchanges N]]
   decode  nanoseconds to decode and encode a point through a profile, and to plan reads
   wire    processor time a request of client and server, beside a bare C program and tokio-modbus
-Without a word it runs both.";
+  fleet   a thousand and ten thousand devices polled each second: share of a processor, memory
+  serial  the silence before each request on a serial line, and the time of a full refresh
+Without a word it runs them all.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match arguments.as_slice() {
-        [] => decode::run().and_then(|()| wire::run(&[])),
+        [] => decode::run()
+            .and_then(|()| wire::run(&[]))
+            .and_then(|()| fleet::run(&[]))
+            .and_then(|()| serial::run(&[])),
         ["decode"] => decode::run(),
         ["wire", options @ ..] => wire::run(options),
+        ["serial", options @ ..] => serial::run(options),
+        ["fleet", options @ ..] => fleet::run(options),
         // How the bench starts its peers: each is a process of its own, so that its processor time is its own.
         ["peer", role @ ..] => peers::run(role),
         _ => Err(USAGE.into()),

@@ -11,11 +11,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use busbar_emulator::Config;
-use busbar_link::{Endpoint, Link, Options};
+use busbar_link::{Endpoint, Link, Options, Serial, SerialPort};
 use busbar_modbus::{Framing, Registers, Request, Response, Server};
+use busbar_profile::Image;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::time::sleep;
+use tokio::time::{Instant, sleep, sleep_until};
 use tokio_modbus::client::{Reader, tcp};
 use tokio_modbus::prelude as theirs;
 use tokio_modbus::server::tcp::accept_tcp_connection;
@@ -30,6 +31,21 @@ pub(crate) fn run(role: &[&str]) -> Result<(), Box<dyn Error>> {
         ["busbar", "server"] => runtime.block_on(serve()),
         ["emulator", "server"] => runtime.block_on(emulate()),
         ["tokio-modbus", "server"] => runtime.block_on(serve_theirs()),
+        ["busbar", "serial", path, count] => runtime.block_on(read_line(path, count.parse()?)),
+        ["tokio-modbus", "serial", path, count] => runtime.block_on(read_line_theirs(path, count.parse()?)),
+        [name, "fleet", port, devices, settle, run] => {
+            let fleet = Fleet {
+                address: SocketAddr::from(([127, 0, 0, 1], port.parse()?)),
+                devices: devices.parse()?,
+                settle: Duration::from_millis(settle.parse()?),
+                run: Duration::from_millis(run.parse()?),
+            };
+            match name {
+                "busbar" => runtime.block_on(fleet.poll(follow)),
+                "tokio-modbus" => runtime.block_on(fleet.poll(follow_theirs)),
+                _ => Err("no such peer".into()),
+            }
+        }
         [name, "client", port, connections, warm, run] => {
             let client = Asking {
                 address: SocketAddr::from(([127, 0, 0, 1], port.parse()?)),
@@ -90,6 +106,116 @@ async fn ask_theirs(address: SocketAddr, exchanges: Arc<AtomicU64>) {
     while let Ok(Ok(_)) = context.read_holding_registers(ADDRESS, COUNT).await {
         exchanges.fetch_add(1, Ordering::Relaxed);
     }
+}
+
+/// Devices that are polled each second.
+struct Fleet {
+    address: SocketAddr,
+    devices: usize,
+    settle: Duration,
+    run: Duration,
+}
+
+/// What a fleet has counted.
+#[derive(Default)]
+struct Counted {
+    reads: AtomicU64,
+    late: AtomicU64,
+    changes: AtomicU64,
+}
+
+impl Fleet {
+    async fn poll<F>(self, device: impl Fn(SocketAddr, Beat, Arc<Counted>) -> F) -> Result<(), Box<dyn Error>>
+    where
+        F: Future<Output = ()> + Send + 'static,
+    {
+        let counted = Arc::new(Counted::default());
+        // They connect within half of the time to settle, and each keeps its place in the second.
+        let apart = self.settle / 2 / u32::try_from(self.devices)?;
+        for _ in 0..self.devices {
+            tokio::spawn(device(self.address, Beat::new(), Arc::clone(&counted)));
+            sleep(apart).await;
+        }
+        sleep(self.settle / 2).await;
+        let before = counted.reads.load(Ordering::Relaxed);
+        println!("go");
+        sleep(self.run).await;
+        let reads = counted.reads.load(Ordering::Relaxed) - before;
+        println!("end {reads} {}", counted.late.load(Ordering::Relaxed));
+        Ok(())
+    }
+}
+
+/// Once a second.
+struct Beat(Instant);
+
+impl Beat {
+    const EVERY: Duration = Duration::from_secs(1);
+
+    fn new() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Waits for the next beat, and counts one that comes too late.
+    async fn next(&mut self, counted: &Counted) {
+        self.0 += Self::EVERY;
+        sleep_until(self.0).await;
+        counted.late.fetch_add(u64::from(self.0.elapsed() > Self::EVERY), Ordering::Relaxed);
+    }
+}
+
+/// One device through the whole way of a reading: registers, image, what changed, values with their quality.
+async fn follow(address: SocketAddr, mut beat: Beat, counted: Arc<Counted>) {
+    let Some(profile) = busbar_profile::builtin("datakom-d") else { return };
+    let Ok(link) = Link::open(Endpoint::from(address), Options::default()) else { return };
+    let mut image = Image::new(profile);
+    let (mut registers, mut changed) = (Vec::new(), Vec::new());
+    loop {
+        if link.read_registers_into(UNIT, 3, ADDRESS, COUNT, &mut registers).await.is_ok() {
+            counted.reads.fetch_add(1, Ordering::Relaxed);
+            changed.clear();
+            image.store(ADDRESS, &registers, &mut changed);
+            for &point in &changed {
+                let Some(raw) = image.registers(point) else { continue };
+                let decoded = profile.points[point].decode(raw, profile.wire.word_order);
+                counted.changes.fetch_add(u64::from(decoded.value.is_some()), Ordering::Relaxed);
+            }
+        }
+        beat.next(&counted).await;
+    }
+}
+
+async fn follow_theirs(address: SocketAddr, mut beat: Beat, counted: Arc<Counted>) {
+    let Ok(stream) = TcpStream::connect(address).await else { return };
+    if stream.set_nodelay(true).is_err() {
+        return;
+    }
+    let mut context = tcp::attach_slave(stream, theirs::Slave(UNIT));
+    loop {
+        if let Ok(Ok(registers)) = context.read_holding_registers(ADDRESS, COUNT).await {
+            counted.reads.fetch_add(u64::from(!registers.is_empty()), Ordering::Relaxed);
+        }
+        beat.next(&counted).await;
+    }
+}
+
+async fn read_line(path: &str, count: usize) -> Result<(), Box<dyn Error>> {
+    let link = Link::open(format!("rtu://{path}?baud=9600").parse()?, Options::default())?;
+    let mut registers = Vec::new();
+    for _ in 0..count {
+        link.read_registers_into(UNIT, 3, ADDRESS, COUNT, &mut registers).await?;
+    }
+    Ok(())
+}
+
+/// On our port: theirs is the protocol.
+async fn read_line_theirs(path: &str, count: usize) -> Result<(), Box<dyn Error>> {
+    let port = SerialPort::open(path, &Serial::default())?;
+    let mut context = tokio_modbus::client::rtu::attach_slave(port, theirs::Slave(UNIT));
+    for _ in 0..count {
+        context.read_holding_registers(ADDRESS, COUNT).await??;
+    }
+    Ok(())
 }
 
 /// The smallest server on `busbar_modbus::Server`: registers that hold their address.

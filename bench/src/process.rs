@@ -21,6 +21,15 @@ pub(crate) fn on_one_processor(program: impl AsRef<OsStr>) -> Result<Command, Bo
     Ok(command)
 }
 
+/// The interpreter in which `make setup` installs pymodbus.
+pub(crate) fn python() -> Result<Command, Box<dyn Error>> {
+    let interpreter = concat!(env!("CARGO_MANIFEST_DIR"), "/../.venv/bin/python");
+    match fs::exists(interpreter)? {
+        true => Ok(Command::new(interpreter)),
+        false => Err("pymodbus is not installed: run make setup first".into()),
+    }
+}
+
 /// A child that is killed when it is dropped.
 pub(crate) struct Process {
     child: Child,
@@ -53,6 +62,15 @@ impl Process {
             nanos += on_cpu.parse::<u64>()?;
         }
         Ok(Duration::from_nanos(nanos))
+    }
+}
+
+impl Process {
+    /// Bytes of memory that it has now.
+    pub(crate) fn resident(&self) -> Result<u64, Box<dyn Error>> {
+        let status = fs::read_to_string(format!("/proc/{}/status", self.child.id()))?;
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).ok_or("no VmRSS")?;
+        Ok(line.trim().trim_end_matches(" kB").parse::<u64>()? * 1024)
     }
 }
 

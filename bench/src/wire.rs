@@ -158,7 +158,7 @@ fn expect(line: &str, expected: &str) -> Result<(), Box<dyn Error>> {
 }
 
 /// Compiles the bare C program beside the bench's own binary.
-fn compile_bare() -> Result<PathBuf, Box<dyn Error>> {
+pub(crate) fn compile_bare() -> Result<PathBuf, Box<dyn Error>> {
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/bare.c");
     let binary = std::env::current_exe()?.with_file_name("busbar-bench-bare");
     let status = Command::new("cc").args(["-O2", "-Wall", "-o"]).arg(&binary).arg(source).status()?;

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import pytest
 from pymodbus.client import ModbusTcpClient
-from pymodbus.server import ModbusTcpServer
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -48,6 +48,13 @@ def busbar(*arguments):
     return Outcome(done.returncode, done.stdout, done.stderr)
 
 
+def ended_by_ctrl_c(process):
+    """Presses Ctrl-C and sees to it that the process ends with 0."""
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, err
+
+
 @contextlib.contextmanager
 def emulation(*arguments, key="datakom-d"):
     """An imitated controller; yields its host and port, and sees to it that Ctrl-C ends it with 0."""
@@ -62,9 +69,7 @@ def emulation(*arguments, key="datakom-d"):
         assert url.startswith("tcp://127.0.0.1:"), f"no URL but {url!r}: {process.stderr.read() if not url else ''}"
         host, _, port = url.removeprefix("tcp://").rpartition(":")
         yield host, int(port)
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0, err
+        ended_by_ctrl_c(process)
     finally:
         process.kill()
         process.communicate()
@@ -96,14 +101,44 @@ def modbus(d500):
         yield peer
 
 
+@dataclass
+class Line:
+    """A serial line as socat makes it: bytes that go in at one end come out at the other."""
+
+    near: str
+    far: str
+    process: subprocess.Popen
+
+    @property
+    def url(self):
+        return f"rtu://{self.near}?baud=9600&parity=none&stop=1"
+
+
+@pytest.fixture
+def line(tmp_path):
+    """A serial line of two pseudo-terminals, both there when the test begins."""
+    near, far = tmp_path / "near", tmp_path / "far"
+    call = ["socat", "-d", "-d", f"pty,raw,echo=0,link={near}", f"pty,raw,echo=0,link={far}"]
+    with subprocess.Popen(call, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            for said in process.stderr:
+                if "starting data transfer loop" in said:
+                    break
+            yield Line(str(near), str(far), process)
+        finally:
+            process.kill()
+
+
 class Peer:
     """pymodbus as a server in a thread of its own.
 
-    `registers` maps the first address of each block to its values. `on_read` is awaited before each answer and may
+    `registers` maps the first address of each block to its values; `line` is a `Line` to sit at the far end of, else
+    it listens on TCP. `on_read` is awaited before each answer and may
     return an exception code; `on_answer` sees, and may replace, each PDU that leaves.
     """
 
-    def __init__(self, registers, unit=1, on_read=None, on_answer=None):
+    def __init__(self, registers, unit=1, on_read=None, on_answer=None, line=None):
+        self.line = line
         self.requests = []
         self.stopped = None
         self.loop = asyncio.new_event_loop()
@@ -123,6 +158,8 @@ class Peer:
 
     @property
     def url(self):
+        if self.line:
+            return self.line.url
         host, port = self.address
         return f"tcp://{host}:{port}"
 
@@ -141,11 +178,14 @@ class Peer:
             for address, values in registers.items()
         ]
         self.stopped = asyncio.Event()
-        server = ModbusTcpServer(
-            SimDevice(unit, simdata=blocks, action=action), address=("127.0.0.1", 0), trace_pdu=trace
-        )
+        device = SimDevice(unit, simdata=blocks, action=action)
+        if self.line:
+            server = ModbusSerialServer(device, port=self.line.far, baudrate=9600, trace_pdu=trace)
+        else:
+            server = ModbusTcpServer(device, address=("127.0.0.1", 0), trace_pdu=trace)
         await server.serve_forever(background=True)
-        self.address = server.transport.sockets[0].getsockname()
+        if not self.line:
+            self.address = server.transport.sockets[0].getsockname()
         self.ready.set()
         await self.stopped.wait()
         await server.shutdown()

@@ -74,6 +74,12 @@ impl Bank {
         self.refused
     }
 
+    /// Puts one word into every register, so that a test sees which ones a panel never stores.
+    #[cfg(test)]
+    pub(crate) fn fill(&mut self, word: u16) {
+        self.registers.fill(word);
+    }
+
     /// The registers asked for, when all of them are readable.
     pub(crate) fn read(&self, address: u16, count: u16) -> Option<&[u16]> {
         if !self.is_readable(address, count) {
@@ -166,6 +172,14 @@ impl Bank {
         let point = self.point(address)?;
         let registers = self.read(address, point.registers)?;
         Some(point.decode(registers, self.profile.wire.word_order).value?.as_number()?.as_f64())
+    }
+
+    /// Sets every bit of a point, so that a test sees whether a panel stores it.
+    #[cfg(test)]
+    pub(crate) fn spoil(&mut self, point: &Point) {
+        if let Some(slots) = self.slots(point) {
+            slots.fill(0xFFFF);
+        }
     }
 
     fn store(&mut self, address: u16, value: &Value) {

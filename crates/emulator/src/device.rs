@@ -13,12 +13,14 @@ use crate::panel::Panel;
 use crate::pins;
 use crate::random::Random;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
+use crate::smartgen_acc1700::{Acc1700, Model};
+use crate::smartgen_hat821si::Hat821si;
 
 /// The plant and the panel move in steps of this much simulated time, whatever the speed: so the same inputs at
 /// the same simulated times give the same registers.
 pub const STEP: Duration = Duration::from_millis(100);
 
-const IMITATED: [&str; 1] = ["datakom-d"];
+const IMITATED: [&str; 3] = ["datakom-d", "smartgen-hat821si", "smartgen-acc1700"];
 
 /// A controller with its plant, its registers and the wire rules of its manual.
 ///
@@ -165,9 +167,31 @@ impl Device {
 }
 
 fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
-    if profile.key != "datakom-d" {
-        return Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() });
+    match profile.key.as_str() {
+        "datakom-d" => datakom_d(profile, config),
+        "smartgen-acc1700" => {
+            let model = Model::of(chosen(&profile.models, config, "ACC1700CAN")?);
+            Ok(Box::new(Acc1700::new(model, config.seed, config.story)))
+        }
+        "smartgen-hat821si" => {
+            // There is one.
+            chosen(&profile.models, config, "HAT821SI")?;
+            Ok(Box::new(Hat821si::new(config.seed, config.story)))
+        }
+        _ => Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() }),
     }
+}
+
+/// The model asked for, as the profile writes it.
+fn chosen<'a>(models: &'a [String], config: &Config, default: &str) -> Result<&'a str, StartError> {
+    let wanted = config.model.as_deref().unwrap_or(default);
+    let known = models.iter().find(|model| model.eq_ignore_ascii_case(wanted));
+    known
+        .map(String::as_str)
+        .ok_or_else(|| StartError::UnknownModel { model: wanted.to_owned(), allowed: models.to_vec() })
+}
+
+fn datakom_d(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
     let wanted = config.model.as_deref().unwrap_or("D-500");
     // Every unit that its identity tells apart, with those the manual's title does not name.
     let known = profile.identity.as_ref().map_or(&[][..], |identity| &identity.models);

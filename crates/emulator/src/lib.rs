@@ -18,6 +18,8 @@ mod plant;
 mod random;
 mod rules;
 mod server;
+mod smartgen_acc1700;
+mod smartgen_hat821si;
 mod waveform;
 
 pub use config::Config;

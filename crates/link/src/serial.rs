@@ -31,25 +31,26 @@ impl SerialPort {
     /// Any [`SerialError`].
     pub fn open(path: &str, serial: &Serial) -> Result<Self, SerialError> {
         let claim = Claim::new(path)?;
-        let port = serial2_tokio::SerialPort::open(path, KeepSettings).map_err(|error| sorted(&error))?;
+        let port =
+            serial2_tokio::SerialPort::open(path, KeepSettings).map_err(|error| SerialError::from(&error))?;
         // From here on it is dropped as a whole.
         let mut port = Self { port, claim };
         port.set(serial)?;
         port.claim.keep_others_out();
-        port.port.discard_input_buffer().map_err(|error| sorted(&error))?;
+        port.port.discard_input_buffer().map_err(|error| SerialError::from(&error))?;
         Ok(port)
     }
 
     /// One setting after the other, so that the one that is refused can be named.
     fn set(&mut self, serial: &Serial) -> Result<(), SerialError> {
         let port = &mut self.port;
-        let mut settings = port.get_configuration().map_err(|error| sorted(&error))?;
+        let mut settings = port.get_configuration().map_err(|error| SerialError::from(&error))?;
         settings.set_raw();
         settings.set_char_size(CharSize::Bits8);
-        port.set_configuration(&settings).map_err(|error| sorted(&error))?;
-        self.claim.ignore_modem_lines().map_err(|error| sorted(&error))?;
+        port.set_configuration(&settings).map_err(|error| SerialError::from(&error))?;
+        self.claim.ignore_modem_lines().map_err(|error| SerialError::from(&error))?;
 
-        let mut settings = port.get_configuration().map_err(|error| sorted(&error))?;
+        let mut settings = port.get_configuration().map_err(|error| SerialError::from(&error))?;
         let mut apply = |refused: SerialError, change: &dyn Fn(&mut Settings) -> io::Result<()>| {
             let applied = change(&mut settings).and_then(|()| port.set_configuration(&settings));
             applied.map_err(|error| match SerialError::from_gone(&error) {
@@ -187,14 +188,16 @@ const ENODEV: i32 = 19;
 const EISDIR: i32 = 21;
 const ENOTTY: i32 = 25;
 
-/// What the operating system said when a device was opened, sorted.
-fn sorted(error: &io::Error) -> SerialError {
-    match (error.raw_os_error(), error.kind()) {
-        (_, io::ErrorKind::NotFound) => SerialError::Missing,
-        (_, io::ErrorKind::PermissionDenied) => SerialError::NotAllowed,
-        (Some(EBUSY), _) => SerialError::Busy,
-        (Some(ENOTTY | EISDIR), _) => SerialError::NotSerial,
-        (code, kind) => SerialError::from_gone(error).unwrap_or(SerialError::Io { kind, code }),
+/// What the operating system said, sorted.
+impl From<&io::Error> for SerialError {
+    fn from(error: &io::Error) -> Self {
+        match (error.raw_os_error(), error.kind()) {
+            (_, io::ErrorKind::NotFound) => Self::Missing,
+            (_, io::ErrorKind::PermissionDenied) => Self::NotAllowed,
+            (Some(EBUSY), _) => Self::Busy,
+            (Some(ENOTTY | EISDIR), _) => Self::NotSerial,
+            (code, kind) => Self::from_gone(error).unwrap_or(Self::Io { kind, code }),
+        }
     }
 }
 
@@ -229,7 +232,7 @@ impl Claim {
 
         use rustix::fs::OFlags;
 
-        let metadata = std::fs::metadata(path).map_err(|error| sorted(&error))?;
+        let metadata = std::fs::metadata(path).map_err(|error| SerialError::from(&error))?;
         if !metadata.file_type().is_char_device() {
             return Err(SerialError::NotSerial);
         }
@@ -241,14 +244,14 @@ impl Claim {
             .write(true)
             .custom_flags(flags.cast_signed())
             .open(path)
-            .map_err(|error| sorted(&error))?;
+            .map_err(|error| SerialError::from(&error))?;
         if !rustix::termios::isatty(&file) {
             return Err(SerialError::NotSerial);
         }
         match file.try_lock() {
             Ok(()) => Ok(Self { file, pseudo: is_pseudo(metadata.rdev()) }),
             Err(TryLockError::WouldBlock) => Err(SerialError::Busy),
-            Err(TryLockError::Error(error)) => Err(sorted(&error)),
+            Err(TryLockError::Error(error)) => Err(SerialError::from(&error)),
         }
     }
 
@@ -335,9 +338,9 @@ mod tests {
             (19, SerialError::Gone),
             (25, SerialError::NotSerial),
         ] {
-            assert_eq!(sorted(&io::Error::from_raw_os_error(code)), expected, "{code}");
+            assert_eq!(SerialError::from(&io::Error::from_raw_os_error(code)), expected, "{code}");
         }
-        let full = sorted(&io::Error::from_raw_os_error(24));
+        let full = SerialError::from(&io::Error::from_raw_os_error(24));
         assert!(full.to_string().contains("os error 24"), "{full}");
     }
 

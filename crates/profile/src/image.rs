@@ -1,16 +1,26 @@
 //! The registers of one device, as far as they have been read, and which points a read has changed.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use crate::point::Point;
 use crate::profile::Profile;
 
 /// The registers of one device over its readable ranges.
 ///
-/// A client stores answers in it; an imitated device serves reads out of it.
+/// A client stores answers in it; an imitated device serves reads out of it. Devices of one profile share everything
+/// but the registers: ten thousand of them have to fit into a small machine.
 #[derive(Clone, Debug)]
 pub struct Image {
+    outline: Arc<Outline>,
+    registers: Box<[u16]>,
+    known: Known,
+}
+
+/// Where registers and points of a profile stand in an image.
+#[derive(Debug)]
+pub(crate) struct Outline {
     spans: Vec<Span>,
-    registers: Vec<u16>,
-    known: Vec<bool>,
     /// Points over register `i` are `points[starts[i]..starts[i + 1]]`.
     starts: Vec<u32>,
     points: Vec<u32>,
@@ -26,36 +36,22 @@ struct Span {
     base: usize,
 }
 
-impl Image {
-    /// An image of which nothing has been read yet.
-    pub fn new(profile: &Profile) -> Self {
-        let mut spans = Vec::with_capacity(profile.wire.readable.len());
+impl Outline {
+    pub(crate) fn new(readable: &[(u16, u16)], points: &[Point]) -> Self {
+        let mut spans = Vec::with_capacity(readable.len());
         let mut len = 0;
-        for &(first, last) in &profile.wire.readable {
+        for &(first, last) in readable {
             spans.push(Span { first, last, base: len });
             len += usize::from(last - first) + 1;
         }
-        let mut image = Self {
-            spans,
-            registers: vec![0; len],
-            known: vec![false; len],
-            starts: Vec::with_capacity(len + 1),
-            points: Vec::new(),
-            places: Vec::new(),
-        };
-        image.index(&profile.points);
-        image
+        let mut outline =
+            Self { spans, starts: Vec::with_capacity(len + 1), points: Vec::new(), places: Vec::new() };
+        outline.index(len, points);
+        outline
     }
 
-    /// An image in which every register is known and 0: what an imitated device starts from.
-    pub fn zeroed(profile: &Profile) -> Self {
-        let mut image = Self::new(profile);
-        image.known.fill(true);
-        image
-    }
-
-    fn index(&mut self, points: &[Point]) {
-        let mut over = vec![Vec::new(); self.registers.len()];
+    fn index(&mut self, len: usize, points: &[Point]) {
+        let mut over = vec![Vec::new(); len];
         for (index, point) in points.iter().enumerate() {
             let place = match self.position(point.address, usize::from(point.registers)) {
                 Some(start) if point.access.is_readable() => (start, usize::from(point.registers)),
@@ -73,6 +69,63 @@ impl Image {
         self.starts.push(self.points.len() as u32);
     }
 
+    /// How many registers there are.
+    fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Where a window begins; none if it is empty or not inside one range.
+    fn position(&self, address: u16, count: usize) -> Option<usize> {
+        let after = self.spans.partition_point(|span| span.first <= address);
+        let span = self.spans[..after].last()?;
+        let end = usize::from(address) + count;
+        if count == 0 || end > usize::from(span.last) + 1 {
+            return None;
+        }
+        Some(span.base + usize::from(address - span.first))
+    }
+}
+
+/// Which registers are known, a bit each.
+#[derive(Clone, Debug)]
+struct Known(Box<[u64]>);
+
+impl Known {
+    fn new(len: usize, known: bool) -> Self {
+        let word = if known { u64::MAX } else { 0 };
+        Self(vec![word; len.div_ceil(64)].into())
+    }
+
+    fn get(&self, slot: usize) -> bool {
+        self.0[slot / 64] >> (slot % 64) & 1 == 1
+    }
+
+    fn set(&mut self, slot: usize) {
+        self.0[slot / 64] |= 1 << (slot % 64);
+    }
+
+    fn all(&self, mut range: Range<usize>) -> bool {
+        range.all(|slot| self.get(slot))
+    }
+}
+
+impl Image {
+    /// An image of which nothing has been read yet.
+    pub fn new(profile: &Profile) -> Self {
+        Self::filled(profile, false)
+    }
+
+    /// An image in which every register is known and 0: what an imitated device starts from.
+    pub fn zeroed(profile: &Profile) -> Self {
+        Self::filled(profile, true)
+    }
+
+    fn filled(profile: &Profile, known: bool) -> Self {
+        let outline = Arc::clone(&profile.outline);
+        let len = outline.len();
+        Self { outline, registers: vec![0; len].into(), known: Known::new(len, known) }
+    }
+
     /// Takes over the registers of an answer, and appends to `changed` the index of each point that is now wholly known
     /// and differs from before, in address order and each once.
     ///
@@ -80,7 +133,7 @@ impl Image {
     pub fn store(&mut self, address: u16, registers: &[u16], changed: &mut Vec<usize>) {
         let already = changed.len();
         let end = usize::from(address) + registers.len();
-        for span in &self.spans {
+        for span in &self.outline.spans {
             let (first, last) = (usize::from(span.first), usize::from(span.last));
             let from = usize::from(address).max(first);
             let to = end.min(last + 1);
@@ -90,16 +143,17 @@ impl Image {
             let window = &registers[from - usize::from(address)..to - usize::from(address)];
             let base = span.base + from - first;
             let range = base..base + window.len();
-            if self.registers[range.clone()] == *window && !self.known[range].contains(&false) {
+            if self.registers[range.clone()] == *window && self.known.all(range) {
                 continue;
             }
             for (slot, &register) in (base..).zip(window) {
-                if self.known[slot] && self.registers[slot] == register {
+                if self.known.get(slot) && self.registers[slot] == register {
                     continue;
                 }
                 self.registers[slot] = register;
-                self.known[slot] = true;
-                for &point in &self.points[self.starts[slot] as usize..self.starts[slot + 1] as usize] {
+                self.known.set(slot);
+                let Outline { starts, points, .. } = &*self.outline;
+                for &point in &points[starts[slot] as usize..starts[slot + 1] as usize] {
                     changed.push(point as usize);
                 }
             }
@@ -123,26 +177,26 @@ impl Image {
         if !self.is_known(point) {
             return None;
         }
-        let &(start, len) = self.places.get(point)?;
+        let &(start, len) = self.outline.places.get(point)?;
         self.registers.get(start as usize..(start + len) as usize)
     }
 
     /// The registers of a point to write into; they are known from then on. None for a point that cannot be read.
     pub fn registers_mut(&mut self, point: usize) -> Option<&mut [u16]> {
-        let &(start, len) = self.places.get(point)?;
+        let &(start, len) = self.outline.places.get(point)?;
         if len == 0 {
             return None;
         }
         let range = start as usize..(start + len) as usize;
-        self.known[range.clone()].fill(true);
+        range.clone().for_each(|slot| self.known.set(slot));
         self.registers.get_mut(range)
     }
 
     /// The registers of a window; none if it leaves the readable ranges or holds a register that is not known.
     pub fn window(&self, address: u16, count: u16) -> Option<&[u16]> {
-        let start = self.position(address, usize::from(count))?;
+        let start = self.outline.position(address, usize::from(count))?;
         let range = start..start + usize::from(count);
-        if self.known[range.clone()].contains(&false) {
+        if !self.known.all(range.clone()) {
             return None;
         }
         self.registers.get(range)
@@ -150,24 +204,14 @@ impl Image {
 
     /// Forgets everything, as after a change of the device.
     pub fn clear(&mut self) {
-        self.known.fill(false);
+        self.known = Known::new(self.registers.len(), false);
     }
 
     fn is_known(&self, point: usize) -> bool {
-        self.places.get(point).is_some_and(|&(start, len)| {
-            len > 0 && !self.known[start as usize..(start + len) as usize].contains(&false)
-        })
-    }
-
-    /// Where a window begins; none if it is empty or not inside one range.
-    fn position(&self, address: u16, count: usize) -> Option<usize> {
-        let after = self.spans.partition_point(|span| span.first <= address);
-        let span = self.spans[..after].last()?;
-        let end = usize::from(address) + count;
-        if count == 0 || end > usize::from(span.last) + 1 {
-            return None;
-        }
-        Some(span.base + usize::from(address - span.first))
+        self.outline
+            .places
+            .get(point)
+            .is_some_and(|&(start, len)| len > 0 && self.known.all(start as usize..(start + len) as usize))
     }
 }
 

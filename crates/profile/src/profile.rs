@@ -1,10 +1,12 @@
 //! The checked model of one controller family.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::command::Command;
 use crate::findings::Findings;
+use crate::image::Outline;
 use crate::joined::Joined;
 use crate::number::Number;
 use crate::point::Point;
@@ -41,6 +43,7 @@ pub struct Profile {
     pub commands: Vec<Command>,
     pub(crate) by_id: HashMap<String, usize>,
     pub(crate) joined: Vec<Joined>,
+    pub(crate) outline: Arc<Outline>,
 }
 
 impl Profile {

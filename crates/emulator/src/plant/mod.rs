@@ -3,10 +3,14 @@
 //! The same seed, steps and controls give the same plant to the last bit. What a panel shows must follow from
 //! here: no register has a value of its own that contradicts another.
 
+mod air;
+mod compressor;
 mod electrical;
 mod engine;
+mod exhaust;
 mod supplies;
 
+pub(crate) use compressor::{Compressor, Orders};
 pub(crate) use electrical::{Energy, Feed};
 pub(crate) use engine::Engine;
 pub(crate) use supplies::{Battery, Tank};

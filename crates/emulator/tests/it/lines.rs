@@ -43,6 +43,10 @@ async fn connect(endpoint: &Endpoint) -> TcpStream {
     TcpStream::connect((host.as_str(), *port)).await.unwrap()
 }
 
+fn family(profile: &str, unit: u8) -> Config {
+    Config { profile: profile.into(), unit, ..Config::default() }
+}
+
 fn sealed(body: &[u8]) -> Vec<u8> {
     [body, &crc16(body).to_le_bytes()].concat()
 }
@@ -298,6 +302,47 @@ async fn a_device_that_cannot_be_used_has_its_sentence_and_nothing_stays_bound()
     let _second = on(&[line.as_str()], &[unit(2)]).await;
     let third = try_on(&[line.as_str()], &[unit(3)]).await.unwrap_err();
     assert!(matches!(third, StartError::SerialDevice { problem: SerialError::Busy, .. }), "{third}");
+}
+
+#[tokio::test]
+async fn controllers_of_several_makers_share_a_line() {
+    let units = [family("smartgen-hat821si", 2), family("smartgen-acc1700", 3), unit(4)];
+    let emulation = on(&["rtu://pty?baud=9600"], &units).await;
+    let mut port = open(&emulation.urls()[0]);
+    for (request, answer) in [
+        // Function 5 to a key with a value that is none, a read that is too long, function 6 to one that lacks it.
+        (&[2, 5, 0x3A, 0x9C, 0x12, 0x34][..], &[2, 0x85, 3][..]),
+        (&[3, 3, 0, 0, 0, 121], &[3, 0x83, 3]),
+        (&[3, 6, 0, 0, 0, 0], &[3, 0x86, 1]),
+        (&[4, 5, 0, 0, 0xFF, 0], &[4, 0x85, 1]),
+        // The transfer switch asked for AUTO, and the compressor for its down key.
+        (&[2, 5, 0x3A, 0x9C, 0xFF, 0], &[2, 5, 0x3A, 0x9C, 0xFF, 0]),
+        (&[3, 5, 0, 8, 0xFF, 0], &[3, 5, 0, 8, 0xFF, 0]),
+    ] {
+        let answer = sealed(answer);
+        assert_eq!(ask(&mut port, &sealed(request), answer.len()).await, answer, "{request:02X?}");
+    }
+    assert_eq!(ask(&mut port, &who(4), 7).await, d500(4));
+    assert_eq!(ask(&mut port, &sealed(&[3, 3, 0, 0, 0, 120]), 245).await[..3], [3, 3, 240]);
+}
+
+#[tokio::test]
+async fn every_controller_of_a_line_must_have_its_settings() {
+    for (endpoint, alone, has) in [
+        (
+            "rtu://pty?baud=115200",
+            "smartgen-hat821si",
+            "baud 2400, 4800, 9600 or 19200, parity none, odd or even, stop 1 or 2",
+        ),
+        (
+            "rtu:///dev/ttyS0?baud=2400",
+            "smartgen-acc1700",
+            "baud 9600, 19200 or 38400, parity none, odd or even, stop 1 or 2",
+        ),
+    ] {
+        let error = try_on(&[endpoint], &[unit(1), family(alone, 2)]).await.unwrap_err().to_string();
+        assert!(error.ends_with(&format!(": {alone} has no such line; choose {has}")), "{error}");
+    }
 }
 
 /// The far end of a serial device that the imitation opens by path.

@@ -1,7 +1,9 @@
 //! The imitated controllers from outside: registers, time and sockets.
 #![cfg(test)]
 
+mod acc1700;
 mod golden;
+mod hat821si;
 mod identities;
 #[cfg(target_os = "linux")]
 mod lines;

@@ -4,9 +4,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::task::Wake;
 
 use super::*;
+use crate::endpoint::Serial;
+use crate::heard::Heard;
 use crate::job::{Ask, Write};
 
 pub(super) const TIMEOUT: u64 = 1000;
+pub(super) const NOTHING: Heard = Heard::Nothing { serial: false };
 const ADDRESS: u16 = 10246;
 
 pub(super) fn ms(millis: u64) -> Duration {
@@ -25,9 +28,14 @@ impl Script {
         Self::with(Options::default())
     }
 
+    /// A wire whose time-outs are always the same, unless the options say otherwise.
     pub(super) fn with(options: Options) -> Self {
+        Self::on(Line::tcp(), Options { timeout_floor: ms(TIMEOUT), ..options })
+    }
+
+    pub(super) fn on(line: Line, options: Options) -> Self {
         Self {
-            wire: Wire::new(endpoint(), Framing::Tcp, &options),
+            wire: Wire::new(endpoint(), line, &options),
             out: Vec::new(),
             wakes: Vec::new(),
             woken: Arc::default(),
@@ -45,8 +53,27 @@ impl Script {
         self.wire.connected(ms(at));
     }
 
+    /// A serial line of 9600 baud, 8N1: 1.041667 ms a character, 3.645834 ms of silence.
+    pub(super) fn serial() -> Self {
+        let mut script = Self::on(Line::rtu(&Serial::default()), Options::default());
+        script.connect(0);
+        script
+    }
+
     pub(super) fn step(&mut self, at: u64) -> Step {
-        self.wire.step(ms(at), &mut self.out, &mut self.wakes)
+        self.step_at(ms(at))
+    }
+
+    pub(super) fn step_at(&mut self, at: Duration) -> Step {
+        self.wire.step(at, &mut self.out, &mut self.wakes)
+    }
+
+    /// Steps, and expects a frame to leave; gives back unit and address, and how long its answer is waited for.
+    pub(super) fn asks(&mut self, at: u64) -> (u8, u16, Duration) {
+        let Step::Send(Some(until)) = self.step(at) else { panic!("nothing leaves at {at} ms") };
+        let front = if self.wire.line.is_rtu() { 0 } else { 6 };
+        let address = u16::from_be_bytes([self.out[front + 2], self.out[front + 3]]);
+        (self.out[front], address, until - ms(at))
     }
 
     /// Steps, and expects a frame to leave.
@@ -66,10 +93,7 @@ impl Script {
         priority: Priority,
         ask: Ask,
     ) -> Result<Ticket, LinkError> {
-        self.submit_job(
-            at,
-            Job { unit, ask, priority, timeout: ms(TIMEOUT), short: false, registers: Vec::new() },
-        )
+        self.submit_job(at, Job { ask, priority, ..job(unit) })
     }
 
     pub(super) fn submit_job(&mut self, at: u64, job: Job) -> Result<Ticket, LinkError> {
@@ -106,7 +130,7 @@ impl Script {
     }
 
     pub(super) fn statistics(&self) -> Statistics {
-        self.wire.statistics()
+        self.wire.statistics(Duration::ZERO)
     }
 }
 
@@ -122,6 +146,19 @@ pub(super) fn lost(cause: Cause) -> LinkError {
     LinkError::Lost { unit: 1, loss: Loss::Dropped(Outage { endpoint: endpoint(), cause }) }
 }
 
+/// A read that a person waits for.
+pub(super) fn job(unit: u8) -> Job {
+    Job {
+        unit,
+        ask: read(ADDRESS),
+        priority: Priority::Person,
+        timeout: ms(TIMEOUT),
+        spacing: Duration::ZERO,
+        short: false,
+        registers: Vec::new(),
+    }
+}
+
 pub(super) fn read(address: u16) -> Ask {
     Ask::Holding { address, count: 2 }
 }
@@ -134,6 +171,25 @@ pub(super) fn frame(transaction: u16, pdu: &[u8]) -> Vec<u8> {
     let [high, low] = transaction.to_be_bytes();
     let length = u8::try_from(pdu.len() + 1).unwrap();
     [&[high, low, 0, 0, 0, length, 1], pdu].concat()
+}
+
+/// The answer of a unit on RTU.
+pub(super) fn rtu_frame(unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let body = [&[unit], pdu].concat();
+    [&body[..], &busbar_modbus::rtu::crc16(&body).to_le_bytes()].concat()
+}
+
+/// The answer of a unit to `read` on RTU.
+pub(super) fn rtu_answer(unit: u8, first: u16) -> Vec<u8> {
+    let [high, low] = first.to_be_bytes();
+    rtu_frame(unit, &[0x03, 4, high, low, 0, 0])
+}
+
+/// The answer of a unit to `read`.
+pub(super) fn answer_of(unit: u8, transaction: u16) -> Vec<u8> {
+    let mut answer = answer(transaction);
+    answer[6] = unit;
+    answer
 }
 
 /// The answer to `read`.

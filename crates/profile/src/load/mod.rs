@@ -13,11 +13,13 @@ mod vocabulary;
 mod wire;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::file::{
     At, BitFile, ChoiceFile, CoilFile, CommandFile, GroupFile, JoinedFile, PointFile, ProfileFile,
 };
 use crate::findings::{Collector, Findings};
+use crate::image::Outline;
 use crate::profile::{Coil, Identity, IdentityModel, Manual, Profile};
 use crate::suggest::nearest;
 use crate::terms::DataType;
@@ -59,6 +61,7 @@ pub(crate) fn parse(file_name: &str, text: &str, vocabulary: &Vocabulary) -> Res
         return Err(collector.into_findings());
     };
     let layout::Layout { points, groups, by_id } = layout;
+    let outline = Arc::new(Outline::new(&wire.readable, &points));
     Ok(Profile {
         key: file.key.clone(),
         vendor: file.vendor.clone(),
@@ -73,6 +76,7 @@ pub(crate) fn parse(file_name: &str, text: &str, vocabulary: &Vocabulary) -> Res
         commands,
         by_id: by_id.into_iter().filter_map(|(id, index)| Some((id, index?))).collect(),
         joined,
+        outline,
     })
 }
 

@@ -1,0 +1,198 @@
+//! A diesel compressor: the engine turns a screw that fills a receiver, and a site that draws air from it.
+//!
+//! The same seed, steps and orders give the same plant to the last bit.
+
+use crate::random::{Drift, Random, approach};
+
+use super::air::Air;
+use super::exhaust::{Exhaust, ParticleFilter};
+use super::{Battery, Controls, Engine, RATED_KW, RATED_RPM, Tank};
+
+/// What a panel can do to the compressor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Orders {
+    /// Fuel solenoid open.
+    pub(crate) fuel: bool,
+    /// Starter motor engaged.
+    pub(crate) starter: bool,
+    /// Governor at idle speed.
+    pub(crate) idle: bool,
+    /// The screw's intake is open.
+    pub(crate) load_valve: bool,
+    /// The receiver is vented.
+    pub(crate) blow_down: bool,
+}
+
+/// The whole of it; a panel reads the fields and hands back [`Orders`].
+#[derive(Clone, Debug)]
+pub(crate) struct Compressor {
+    /// Seconds since power-on.
+    pub(crate) time: f64,
+    pub(crate) engine: Engine,
+    pub(crate) air: Air,
+    pub(crate) exhaust: Exhaust,
+    pub(crate) filter: ParticleFilter,
+    pub(crate) battery: Battery,
+    pub(crate) tank: Tank,
+    /// Somebody pumps fuel into the tank.
+    pub(crate) refilling: bool,
+    /// degC.
+    pub(crate) ambient: f64,
+    /// degC of the air that the engine breathes.
+    pub(crate) intake: f64,
+    /// degC of the fuel at the injection pump.
+    pub(crate) fuel_temperature: f64,
+    /// kPa before the injection pump.
+    pub(crate) fuel_pressure: f64,
+    weather: Drift,
+    lift_pump: Drift,
+    random: Random,
+}
+
+impl Compressor {
+    pub(crate) fn new(seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        Self {
+            time: 0.0,
+            engine: Engine::new(&mut random),
+            air: Air::new(&mut random),
+            exhaust: Exhaust::new(30.0),
+            filter: ParticleFilter::new(random.between(30.0, 60.0)),
+            battery: Battery::new(&mut random),
+            tank: Tank::new(random.between(70.0, 85.0)),
+            refilling: false,
+            ambient: 19.0,
+            intake: 21.0,
+            fuel_temperature: 24.0,
+            fuel_pressure: 0.0,
+            weather: Drift::new(0.4, 600.0, &mut random),
+            lift_pump: Drift::new(4.0, 3.0, &mut random),
+            random,
+        }
+    }
+
+    /// Lets `dt` seconds pass; meant for steps of about a tenth of a second.
+    pub(crate) fn step(&mut self, dt: f64, orders: &Orders) {
+        self.time += dt;
+        let fuel = orders.fuel && self.tank.litres > 0.0;
+        let controls = Controls { fuel, starter: orders.starter, idle: orders.idle, ..Controls::default() };
+        let power = self.shaft_power();
+        self.engine.step(dt, &controls, power, self.intake, &mut self.random);
+        let speed = self.engine.speed / RATED_RPM;
+        self.air.step(dt, speed, orders.load_valve, orders.blow_down, self.ambient, &mut self.random);
+
+        let (running, pull) = (self.engine.is_running(), self.torque() / 100.0);
+        self.exhaust.step(dt, running, pull, speed, self.filter.is_regenerating(), self.intake);
+        self.filter.step(dt, running, &self.exhaust);
+        // A small charger on shore supply keeps the battery while the engine rests.
+        self.battery.step(dt, orders.starter, running, true, &mut self.random);
+        self.tank.step(dt, self.engine.burn, self.refilling);
+        self.climate(dt);
+
+        let lift = 370.0 + 20.0 * speed + self.lift_pump.step(dt, &mut self.random);
+        approach(&mut self.fuel_pressure, if fuel { lift } else { 0.0 }, 0.6, dt);
+    }
+
+    /// kW that the screw asks of the engine.
+    pub(crate) fn shaft_power(&self) -> f64 {
+        self.air.shaft_power(self.engine.speed / RATED_RPM)
+    }
+
+    /// What the engine gives, in percent of its rated torque, its own friction included.
+    pub(crate) fn torque(&self) -> f64 {
+        if !self.engine.is_running() {
+            return 0.0;
+        }
+        let rated = self.shaft_power() / RATED_KW * RATED_RPM / self.engine.speed;
+        (6.0 + 94.0 * rated).min(125.0)
+    }
+
+    /// Percent of the torque that the engine has at this speed: a slow turbo gives less.
+    pub(crate) fn load(&self) -> f64 {
+        self.torque() / (0.7 + 0.3 * (self.engine.speed / RATED_RPM).min(1.0))
+    }
+
+    /// V at the battery and at the charge alternator's D+ terminal: chargers give less the warmer it is.
+    pub(crate) fn voltages(&self) -> [f64; 2] {
+        let less = 0.012 * (self.intake - 21.0);
+        let charging = if self.engine.is_running() { less } else { 0.0 };
+        [self.battery.voltage - less, self.battery.charge_input - charging]
+    }
+
+    /// Percent in the expansion tank, which hot coolant fills.
+    pub(crate) fn coolant_level(&self) -> f64 {
+        (84.0 + 0.12 * (self.engine.coolant - 40.0)).clamp(0.0, 100.0)
+    }
+
+    fn climate(&mut self, dt: f64) {
+        // Power-on is ten in the morning; the warmest hour is three in the afternoon.
+        let hour = 10.0 + self.time / 3600.0;
+        let day = 4.0 * ((hour - 9.0) / 24.0 * std::f64::consts::TAU).sin();
+        self.ambient = 19.0 + day + self.weather.step(dt, &mut self.random);
+        let warmer = 2.0 + 0.15 * (self.engine.coolant - self.ambient).max(0.0);
+        approach(&mut self.intake, self.ambient + warmer, 180.0, dt);
+        // What the injectors do not burn comes back warm.
+        let returned = if self.engine.is_running() { 16.0 } else { 0.0 };
+        approach(&mut self.fuel_temperature, self.intake + returned, 240.0, dt);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RUNNING: Orders =
+        Orders { fuel: true, starter: false, idle: false, load_valve: false, blow_down: false };
+    const LOADED: Orders = Orders { load_valve: true, ..RUNNING };
+
+    fn run(plant: &mut Compressor, orders: &Orders, seconds: f64) {
+        for _ in 0..(seconds / 0.1) as u32 {
+            plant.step(0.1, orders);
+        }
+    }
+
+    fn started(seed: u64) -> Compressor {
+        let mut plant = Compressor::new(seed);
+        run(&mut plant, &Orders { starter: true, ..RUNNING }, 4.0);
+        run(&mut plant, &RUNNING, 10.0);
+        plant
+    }
+
+    #[test]
+    fn a_loaded_engine_works_harder_burns_more_and_gets_hotter() {
+        let mut plant = started(1);
+        let (torque, burn, exhaust) = (plant.torque(), plant.engine.burn, plant.exhaust.temperature);
+        assert_eq!(plant.air.pressure, 0.0);
+        run(&mut plant, &LOADED, 40.0);
+        assert!(plant.torque() > torque + 30.0, "{}", plant.torque());
+        assert!(plant.load() <= 105.0, "{}", plant.load());
+        assert!(plant.engine.burn > burn + 6.0);
+        assert!(plant.exhaust.temperature > exhaust + 80.0);
+        assert!(plant.exhaust.boost > 40.0);
+    }
+
+    #[test]
+    fn burned_fuel_leaves_the_tank_and_an_empty_tank_stops_the_engine() {
+        let mut plant = started(2);
+        let (litres, burned) = (plant.tank.litres, plant.engine.burned);
+        run(&mut plant, &RUNNING, 300.0);
+        assert!((litres - plant.tank.litres - (plant.engine.burned - burned)).abs() < 1e-6);
+        plant.tank.litres = 0.0;
+        run(&mut plant, &RUNNING, 20.0);
+        assert_eq!(plant.engine.speed, 0.0);
+        assert!(plant.fuel_pressure < 1.0);
+        run(&mut plant, &Orders { starter: true, ..RUNNING }, 10.0);
+        assert!(!plant.engine.is_running());
+    }
+
+    #[test]
+    fn the_same_seed_is_the_same_plant() {
+        let walk = |seed| {
+            let mut plant = started(seed);
+            run(&mut plant, &LOADED, 60.0);
+            (plant.air.pressure, plant.engine.coolant, plant.battery.voltage)
+        };
+        assert_eq!(walk(9), walk(9));
+        assert_ne!(walk(9), walk(10));
+    }
+}
