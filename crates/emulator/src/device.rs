@@ -8,6 +8,7 @@ use busbar_profile::Profile;
 use crate::bank::Bank;
 use crate::config::Config;
 use crate::datakom_d::DatakomD;
+use crate::datakom_dkg705::DatakomDkg705;
 use crate::error::StartError;
 use crate::panel::Panel;
 use crate::pins;
@@ -17,7 +18,7 @@ use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
 /// the same simulated times give the same registers.
 pub const STEP: Duration = Duration::from_millis(100);
 
-const IMITATED: [&str; 1] = ["datakom-d"];
+const IMITATED: [&str; 2] = ["datakom-d", "datakom-dkg705"];
 
 /// A controller with its plant, its registers and the wire rules of its manual.
 ///
@@ -136,9 +137,26 @@ impl Device {
 }
 
 fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
-    if profile.key != "datakom-d" {
-        return Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() });
+    match profile.key.as_str() {
+        "datakom-d" => datakom_d(profile, config),
+        "datakom-dkg705" => {
+            only_model(profile, config)?;
+            Ok(Box::new(DatakomDkg705::new(config.seed, config.story)))
+        }
+        key => Err(StartError::NotImitated { key: key.to_owned(), imitated: IMITATED.to_vec() }),
     }
+}
+
+/// A model may be named for families without an identity register too, if it is one of theirs.
+fn only_model(profile: &Profile, config: &Config) -> Result<(), StartError> {
+    let Some(wanted) = config.model.as_deref() else { return Ok(()) };
+    match profile.models.iter().any(|model| model.eq_ignore_ascii_case(wanted)) {
+        true => Ok(()),
+        false => Err(StartError::UnknownModel { model: wanted.to_owned(), allowed: profile.models.clone() }),
+    }
+}
+
+fn datakom_d(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
     let wanted = config.model.as_deref().unwrap_or("D-500");
     // Every unit that its identity tells apart, with those the manual's title does not name.
     let known = profile.identity.as_ref().map_or(&[][..], |identity| &identity.models);
