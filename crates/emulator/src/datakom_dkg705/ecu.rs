@@ -8,8 +8,10 @@ use super::settings::SITE;
 
 /// How many fault codes the table has room for.
 pub(super) const FAULTS: usize = 8;
-/// Below this the tank and the battery are reported, % and V.
+/// Below this the tank is reported, %.
 const LOW_FUEL: f64 = 20.0;
+/// Seconds for which a battery must be low: the starter is no fault of its own.
+const BATTERY_SECONDS: f64 = 10.0;
 
 /// A suspect parameter number with its failure mode (SAE J1939-73).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,6 +40,11 @@ pub(super) struct Ecu {
     pub(super) exhaust: f64,
     /// kPa that the air filter takes.
     pub(super) air_filter: f64,
+    /// kW and L/h of the last seconds.
+    power: f64,
+    burn: f64,
+    /// Seconds.
+    battery_low_for: f64,
     faults: [Fault; FAULTS],
 }
 
@@ -50,6 +57,9 @@ impl Ecu {
             manifold: plant.canopy,
             exhaust: plant.canopy,
             air_filter: 0.0,
+            power: 0.0,
+            burn: 0.0,
+            battery_low_for: 0.0,
             faults: [Fault::default(); FAULTS],
         }
     }
@@ -69,10 +79,19 @@ impl Ecu {
         approach(&mut self.fuel, fuel, 200.0, dt);
         approach(&mut self.manifold, manifold, 30.0, dt);
         approach(&mut self.exhaust, exhaust, if plant.engine.is_running() { 15.0 } else { 120.0 }, dt);
+        approach(&mut self.power, plant.genset.total_active().max(0.0), 2.0, dt);
+        approach(&mut self.burn, plant.engine.burn, 2.0, dt);
+        let low = plant.batteries[0].voltage < SITE.low_battery_warning;
+        self.battery_low_for = if low { self.battery_low_for + dt } else { 0.0 };
         self.judge(plant, sequence);
     }
 
-    /// The oldest rows first; rows without a fault are zero.
+    /// kWh a litre, of a running engine.
+    pub(super) fn economy(&self, plant: &Plant) -> f64 {
+        if plant.engine.is_running() && self.burn > 0.0 { self.power / self.burn } else { 0.0 }
+    }
+
+    /// Rows without a fault are zero and come last.
     pub(super) fn faults(&self) -> [Fault; FAULTS] {
         self.faults
     }
@@ -91,8 +110,7 @@ impl Ecu {
                 sequence.is_up_to_speed() && engine.oil_pressure < SITE.low_oil_pressure_warning,
             ),
             (LOW_FUEL_LEVEL, plant.tank.percent() < LOW_FUEL),
-            // The starter is no fault of the battery's.
-            (LOW_BATTERY, !sequence.is_cranking() && plant.batteries[0].voltage < SITE.low_battery_warning),
+            (LOW_BATTERY, self.battery_low_for >= BATTERY_SECONDS),
         ];
         let mut rows = active.into_iter().filter(|(_, on)| *on).map(|(fault, _)| fault);
         self.faults = std::array::from_fn(|_| rows.next().unwrap_or_default());
@@ -109,7 +127,7 @@ mod tests {
         let (mut plant, sequence) = (Plant::new(1), Sequence::new(SITE));
         let mut ecu = Ecu::new(&plant);
         let mut codes = |plant: &Plant| {
-            ecu.step(0.1, plant, &sequence);
+            ecu.step(5.0, plant, &sequence);
             ecu.faults().map(|fault| fault.spn)
         };
         assert_eq!(codes(&plant), [0; FAULTS]);
@@ -117,6 +135,7 @@ mod tests {
         assert_eq!(codes(&plant)[..2], [LOW_FUEL_LEVEL.spn, 0]);
         plant.batteries[0].voltage = 22.0;
         plant.engine.coolant = 100.0;
+        assert_eq!(codes(&plant)[..3], [HIGH_COOLANT_TEMPERATURE.spn, LOW_FUEL_LEVEL.spn, 0]);
         assert_eq!(
             codes(&plant)[..4],
             [HIGH_COOLANT_TEMPERATURE.spn, LOW_FUEL_LEVEL.spn, LOW_BATTERY.spn, 0]

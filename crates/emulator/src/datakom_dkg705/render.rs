@@ -165,8 +165,7 @@ fn ecu(unit: &DatakomDkg705, bank: &mut Bank) {
     bank.number(0x0067, ecu.fuel_pressure);
     bank.number(0x0068, ecu.fuel);
     bank.number(0x0069, engine.burn);
-    let economy = if engine.burn > 0.0 { plant.genset.total_active().max(0.0) / engine.burn } else { 0.0 };
-    bank.number(0x006A, economy);
+    bank.number(0x006A, ecu.economy(plant));
     bank.number(0x006B, engine.oil);
     bank.number(0x006C, plant.ambient);
     bank.number(0x006D, plant.canopy);

@@ -1,6 +1,7 @@
 //! The imitated controllers from outside: registers, time and sockets.
 #![cfg(test)]
 
+mod dkg705;
 mod golden;
 mod identities;
 mod pins;
