@@ -48,7 +48,11 @@ impl Alarms {
         self.horn = self.horn.saturating_sub(dt);
         for (watch, pending) in WATCHES.iter().zip(&mut self.pending) {
             let word = &mut self.words[watch.word as usize];
-            let excess = if watch.live.now(view.sequence) { (watch.excess)(view.plant, &SITE) } else { -1e9 };
+            let excess = if watch.live.now(view.sequence) {
+                (watch.excess)(view.plant, &SITE)
+            } else {
+                f64::NEG_INFINITY
+            };
             *pending = if excess > 0.0 { *pending + dt } else { Duration::ZERO };
             let active = word.contains(watch.bit);
             // It comes with its cause after the delay; a warning goes when the cause is clearly gone.

@@ -24,6 +24,7 @@ mod alarms;
 mod clock;
 mod ecu;
 mod mains;
+mod operation;
 mod regulation;
 mod render;
 mod sequence;
@@ -44,8 +45,9 @@ use alarms::{Alarms, View};
 use clock::Clock;
 use ecu::Ecu;
 use mains::Mains;
+use operation::Operation;
 use regulation::Regulation;
-use sequence::{Demand, Operation, Sensed, Sequence};
+use sequence::{Demand, Sensed, Sequence};
 use settings::SITE;
 use story::Scene;
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::plant::{HERTZ_PER_RPM, Plant, RATED_KVAR, RATED_KW, RATED_RPM, RATED_VOLTAGE};
 
-use super::sequence::Operation;
+use super::operation::Operation;
 
 /// What the full scale of an output adds to and takes from a set point: rpm and V.
 const GOV_SPAN: f64 = 90.0;

@@ -5,7 +5,7 @@ use busbar_profile::{BitSet, Number, Value};
 use crate::bank::Bank;
 use crate::plant::Feed;
 
-use super::sequence::Operation;
+use super::operation::Operation;
 use super::settings::SITE;
 use super::{CLOCK, DatakomDkg705, MODE_KEYS, Mode};
 

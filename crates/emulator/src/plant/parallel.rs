@@ -79,7 +79,6 @@ impl Coupling {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::plant::{Controls, Plant};
 
     const DT: f64 = 0.1;
