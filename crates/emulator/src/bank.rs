@@ -147,6 +147,15 @@ impl Bank {
         self.store(address, &Value::Bytes(bytes));
     }
 
+    /// Stores a value by the id of its point, for registers that hold several.
+    pub(crate) fn put(&mut self, id: &str, value: &Value) {
+        let profile = self.profile;
+        match profile.points.iter().enumerate().find(|(_, point)| point.id == id) {
+            Some((index, point)) => self.keep(index, point, value),
+            None => self.refuse(),
+        }
+    }
+
     /// Stores what the device sends where it has no sensor: the point's sentinel, else 0.
     pub(crate) fn absent(&mut self, address: u16) {
         let Some((index, point)) = self.indexed(address) else { return self.refuse() };
@@ -183,7 +192,13 @@ impl Bank {
     }
 
     fn store(&mut self, address: u16, value: &Value) {
-        let Some((index, point)) = self.indexed(address) else { return self.refuse() };
+        match self.indexed(address) {
+            Some((index, point)) => self.keep(index, point, value),
+            None => self.refuse(),
+        }
+    }
+
+    fn keep(&mut self, index: usize, point: &Point, value: &Value) {
         if self.pinned[index] {
             return;
         }

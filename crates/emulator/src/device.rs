@@ -8,6 +8,7 @@ use busbar_profile::Profile;
 use crate::bank::Bank;
 use crate::config::Config;
 use crate::datakom_d::DatakomD;
+use crate::datakom_dkg705::DatakomDkg705;
 use crate::error::StartError;
 use crate::panel::Panel;
 use crate::pins;
@@ -20,7 +21,7 @@ use crate::smartgen_hat821si::Hat821si;
 /// the same simulated times give the same registers.
 pub const STEP: Duration = Duration::from_millis(100);
 
-const IMITATED: [&str; 3] = ["datakom-d", "smartgen-hat821si", "smartgen-acc1700"];
+const IMITATED: [&str; 4] = ["datakom-d", "datakom-dkg705", "smartgen-hat821si", "smartgen-acc1700"];
 
 /// A controller with its plant, its registers and the wire rules of its manual.
 ///
@@ -169,12 +170,16 @@ impl Device {
 fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
     match profile.key.as_str() {
         "datakom-d" => datakom_d(profile, config),
+        "datakom-dkg705" => {
+            // There is one.
+            chosen(&profile.models, config, "DKG-705")?;
+            Ok(Box::new(DatakomDkg705::new(config.seed, config.story)))
+        }
         "smartgen-acc1700" => {
             let model = Model::of(chosen(&profile.models, config, "ACC1700CAN")?);
             Ok(Box::new(Acc1700::new(model, config.seed, config.story)))
         }
         "smartgen-hat821si" => {
-            // There is one.
             chosen(&profile.models, config, "HAT821SI")?;
             Ok(Box::new(Hat821si::new(config.seed, config.story)))
         }

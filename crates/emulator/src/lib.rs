@@ -9,6 +9,7 @@
 mod bank;
 mod config;
 mod datakom_d;
+mod datakom_dkg705;
 mod device;
 mod error;
 mod lcd;

@@ -2,7 +2,7 @@
 
 use crate::random::{Random, approach};
 
-use super::{Controls, RATED_KW, RATED_RPM};
+use super::{Controls, RATED_KW, RATED_RPM, Regulation};
 
 /// Below this the starter turns the crankshaft; above it the engine turns by itself.
 const FIRED_RPM: f64 = 400.0;
@@ -30,6 +30,8 @@ pub(crate) struct Engine {
     pub(crate) burned: f64,
     /// Hours run since the controller was fitted.
     pub(crate) hours: f64,
+    /// The governor's set point.
+    pub(crate) governor: Regulation,
     /// Seconds of starter still needed before the first cylinder catches.
     until_fire: f64,
     /// kW the governor has already answered; the rest still pulls the speed down.
@@ -48,6 +50,7 @@ impl Engine {
             burn: 0.0,
             burned: hours * 9.3,
             hours,
+            governor: Regulation::default(),
             until_fire: random.between(1.0, 2.2),
             governed: 0.0,
         }
@@ -103,7 +106,10 @@ impl Engine {
         approach(&mut self.governed, load, 0.9, dt);
         let target = match controls.idle {
             true => IDLE_RPM,
-            false => RATED_RPM - 90.0 * (load - self.governed) / RATED_KW + 1.2 * random.noise(),
+            false => {
+                let settled = self.governor.settles_at(RATED_RPM, load / RATED_KW);
+                settled - 90.0 * (load - self.governed) / RATED_KW + 1.2 * random.noise()
+            }
         };
         let before = self.speed;
         approach(&mut self.speed, target, 0.35, dt);

@@ -8,24 +8,33 @@ mod compressor;
 mod electrical;
 mod engine;
 mod exhaust;
+mod parallel;
 mod supplies;
 
 pub(crate) use compressor::{Compressor, Orders};
 pub(crate) use electrical::{Energy, Feed};
 pub(crate) use engine::Engine;
+pub(crate) use parallel::Regulation;
 pub(crate) use supplies::{Battery, Tank};
 
 use crate::random::{Drift, Random, approach};
 
+use parallel::Coupling;
+
 /// Nameplate of the imitated genset: 100 kVA, 230/400 V, 50 Hz, four poles.
 pub(crate) const RATED_KW: f64 = 80.0;
 pub(crate) const RATED_KVA: f64 = 100.0;
+pub(crate) const RATED_KVAR: f64 = 60.0;
 pub(crate) const RATED_RPM: f64 = 1500.0;
-const RATED_VOLTAGE: f64 = 230.9;
+pub(crate) const RATED_VOLTAGE: f64 = 230.9;
 /// Four poles: two periods a turn.
-const HERTZ_PER_RPM: f64 = 2.0 / 60.0;
+pub(crate) const HERTZ_PER_RPM: f64 = 2.0 / 60.0;
 /// Seconds a breaker takes from command to position.
 const BREAKER_SECONDS: f64 = 0.2;
+
+/// kW and kvar of each phase.
+type PhaseLoads = ([f64; 3], [f64; 3]);
+const NO_LOAD: PhaseLoads = ([0.0; 3], [0.0; 3]);
 
 /// What a panel can do to the plant.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -64,6 +73,9 @@ pub(crate) struct Plant {
     pub(crate) ambient: f64,
     /// degC under the canopy.
     pub(crate) canopy: f64,
+    /// The set point of the genset's voltage regulator.
+    pub(crate) excitation: Regulation,
+    coupling: Coupling,
     utility: Utility,
     load: Load,
     alternator: f64,
@@ -87,6 +99,8 @@ impl Plant {
             tank: Tank::new(random.between(70.0, 85.0)),
             ambient: 18.0,
             canopy: 21.0,
+            excitation: Regulation::default(),
+            coupling: Coupling::default(),
             utility: Utility::new(&mut random),
             load: Load::new(&mut random),
             alternator: 0.0,
@@ -129,6 +143,21 @@ impl Plant {
             && (47.0..53.0).contains(&self.genset.frequency)
     }
 
+    /// Takes the voltage off the grid, or gives it back.
+    pub(crate) fn fail_mains(&mut self, failed: bool) {
+        self.utility.failed = failed;
+    }
+
+    /// Whether genset and grid feed one busbar.
+    pub(crate) fn is_parallel(&self) -> bool {
+        self.mains_breaker.closed && self.genset_breaker.closed && self.utility.is_alive()
+    }
+
+    /// By how many degrees the genset leads the mains, -180 to 180; without meaning while one of them is dead.
+    pub(crate) fn angle(&self) -> f64 {
+        self.coupling.angle()
+    }
+
     fn climate(&mut self, dt: f64) {
         // Power-on is ten in the morning; the warmest hour is three in the afternoon.
         let hour = 10.0 + self.time / 3600.0;
@@ -139,35 +168,55 @@ impl Plant {
     }
 
     fn electricity(&mut self, dt: f64) {
-        let residual = 4.0 * self.engine.speed / RATED_RPM;
-        let excited = match self.engine.speed {
-            rpm if rpm > 700.0 => RATED_VOLTAGE * (rpm / (0.95 * RATED_RPM)).min(1.0),
-            _ => residual,
-        };
-        approach(&mut self.alternator, excited, 0.4, dt);
+        self.excite(dt);
         // An alternator that does not turn has no voltage at all, however slowly the regulator forgets.
         let alternator = if self.engine.speed > 0.0 { self.alternator } else { 0.0 };
 
-        let (active, reactive) = self.load.step(dt, &mut self.random);
-        let (mut mains_load, mut genset_load) = (([0.0; 3], [0.0; 3]), ([0.0; 3], [0.0; 3]));
-        if self.mains_breaker.closed && self.utility.is_alive() {
-            mains_load = (active, reactive);
-        } else if self.genset_breaker.closed && alternator > 100.0 {
-            genset_load = (active, reactive);
-        }
+        let load = self.load.step(dt, &mut self.random);
+        let on_mains = self.mains_breaker.closed && self.utility.is_alive();
+        let on_genset = self.genset_breaker.closed && alternator > 100.0;
+        let (mains_load, genset_load) = match (on_mains, on_genset) {
+            (true, true) => {
+                self.coupling.split(dt, load, &self.mains, &self.engine.governor, &self.excitation)
+            }
+            (true, false) => (load, NO_LOAD),
+            (false, true) => (NO_LOAD, load),
+            (false, false) => (NO_LOAD, NO_LOAD),
+        };
 
         let (voltage, frequency) = self.utility.step(dt, mains_load.0.iter().sum(), &mut self.random);
         self.mains = Feed { voltage, frequency, active: mains_load.0, reactive: mains_load.1 };
         self.mains_energy.add(&self.mains, dt);
 
+        let parallel = on_mains && on_genset;
+        if parallel {
+            // One busbar has one frequency and one voltage, and the grid is the stronger.
+            self.engine.speed = frequency / HERTZ_PER_RPM;
+            self.alternator = self.mains.average_voltage();
+        }
+        let terminals = match parallel {
+            true => voltage,
+            false => [0.9985, 1.0008, 1.0007].map(|part| part * alternator),
+        };
         let ripple = 0.0006 * alternator;
         self.genset = Feed {
-            voltage: [0.9985, 1.0008, 1.0007].map(|part| part * alternator + ripple * self.random.noise()),
+            voltage: terminals.map(|volts| volts + ripple * self.random.noise()),
             frequency: self.engine.speed * HERTZ_PER_RPM,
             active: genset_load.0,
             reactive: genset_load.1,
         };
         self.genset_energy.add(&self.genset, dt);
+        self.coupling.follow(dt, &self.genset, &self.mains, parallel);
+    }
+
+    /// The voltage regulator builds up and holds the voltage of a turning alternator.
+    fn excite(&mut self, dt: f64) {
+        let settled = self.excitation.settles_at(RATED_VOLTAGE, self.genset.total_reactive() / RATED_KVAR);
+        let excited = match self.engine.speed {
+            rpm if rpm > 700.0 => settled * (rpm / (0.95 * RATED_RPM)).min(1.0),
+            rpm => 4.0 * rpm / RATED_RPM,
+        };
+        approach(&mut self.alternator, excited, 0.4, dt);
     }
 }
 
@@ -198,6 +247,9 @@ struct Utility {
     common: Drift,
     phases: [Drift; 3],
     frequency: Drift,
+    failed: bool,
+    /// Part of its voltage that is there.
+    present: f64,
 }
 
 impl Utility {
@@ -206,18 +258,27 @@ impl Utility {
             common: Drift::new(1.2, 180.0, random),
             phases: std::array::from_fn(|_| Drift::new(0.5, 15.0, random)),
             frequency: Drift::new(0.012, 8.0, random),
+            failed: false,
+            present: 1.0,
         }
     }
 
-    /// The mains never fail in this version; what fails them belongs here.
     fn is_alive(&self) -> bool {
-        true
+        !self.failed
     }
 
     fn step(&mut self, dt: f64, load: f64, random: &mut Random) -> ([f64; 3], f64) {
         let level = 231.5 + self.common.step(dt, random) - 0.02 * load;
-        let voltage = std::array::from_fn(|phase| level + self.phases[phase].step(dt, random));
-        (voltage, 50.0 + self.frequency.step(dt, random))
+        let voltage: [f64; 3] = std::array::from_fn(|phase| level + self.phases[phase].step(dt, random));
+        let frequency = 50.0 + self.frequency.step(dt, random);
+        // Motors that run down hold the voltage for some periods.
+        approach(&mut self.present, if self.failed { 0.0 } else { 1.0 }, 0.1, dt);
+        match self.present {
+            0.999.. => (voltage, frequency),
+            // Below this a meter sees neither voltage nor frequency.
+            ..0.02 => ([0.0; 3], 0.0),
+            part => (voltage.map(|volts| volts * part), frequency),
+        }
     }
 }
 
@@ -244,7 +305,7 @@ impl Load {
 
     /// kW and kvar of each phase, in the tenths that the controllers' meters resolve: totals are then the exact
     /// sums of what is shown.
-    fn step(&mut self, dt: f64, random: &mut Random) -> ([f64; 3], [f64; 3]) {
+    fn step(&mut self, dt: f64, random: &mut Random) -> PhaseLoads {
         self.machine_switches_in -= dt;
         if self.machine_switches_in <= 0.0 {
             self.machine_on = !self.machine_on;

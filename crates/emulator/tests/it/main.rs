@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod acc1700;
+mod dkg705;
 mod golden;
 mod hat821si;
 mod identities;
