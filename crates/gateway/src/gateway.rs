@@ -77,6 +77,9 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     let listener = listen(options.listen.unwrap_or(site.listen)).await?;
     let address = listener.local_addr().map_err(|error| refused(site.listen, &error))?;
     let links = open(&site)?;
+    for warning in &site.warnings {
+        tracing::warn!("{warning}");
+    }
 
     let (stop, stopped) = stop::channel();
     let devices =

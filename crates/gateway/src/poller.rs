@@ -65,6 +65,7 @@ impl Poller {
         let Some(probe) = POLLED.into_iter().find(|rate| self.plan.has(*rate)) else { return };
         let mut schedule = Schedule::new(self.site.poll, self.hub.now());
         let mut answered = false;
+        self.hub.planned(self.device, self.plan.overview());
         loop {
             let due = self.next(&mut schedule).await;
             let rates = if schedule.is_silent() { probe.into() } else { due };
@@ -176,6 +177,7 @@ impl Poller {
             };
             if failure.is_illegal_address() {
                 let parts = self.plan.refused(rates, read, self.hub.now());
+                self.hub.planned(self.device, self.plan.overview());
                 if !parts.is_empty() {
                     waiting.extend(parts.into_iter().rev());
                     continue;

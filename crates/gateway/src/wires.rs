@@ -1,13 +1,19 @@
 //! The wires of a site: opened, and shown as the API has them.
 
+mod plan;
+
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use busbar_link::{Endpoint, Link, OpenError, Options, Priority, Statistics, WireState};
+use busbar_link::{Endpoint, Latency, Link, OpenError, Options, Priority, Statistics, WireState};
 use busbar_profile::Profile;
 use busbar_profile::plan::Cost;
 
-use crate::api::types::{self, ExceptionCount, WireStatistics, WireView};
-use crate::site::{Site, SiteWire};
+use crate::api::types::{
+    self, ExceptionCount, LatencyBucket, LatencyView, WireDetailView, WireStatistics, WireTime, WireView,
+};
+use crate::poll_plan::Overview;
+use crate::site::{Site, SiteDevice, SiteWire};
 
 /// Opens a wire for the devices of the site that are on it.
 pub(crate) fn open(site: &Site, index: usize, wire: &SiteWire) -> Result<Link, OpenError> {
@@ -22,11 +28,8 @@ fn options(wire: &SiteWire, profiles: &[&Profile]) -> Options {
     let defaults = Options::default();
     Options {
         timeout: wire.timeout.or(longest.map(ms)).unwrap_or(defaults.timeout),
-        // Where there are several, the pauses of one are for the others to use: its poller keeps them.
-        spacing: match profiles {
-            [alone] => spacing(alone),
-            _ => defaults.spacing,
-        },
+        // The pauses of a device are for the others on the wire to use: its poller keeps them.
+        spacing: wire.spacing.unwrap_or(defaults.spacing),
         // Every device has one read waiting at most.
         queue: defaults.queue.max(profiles.len() + 16),
         ..defaults
@@ -45,14 +48,20 @@ pub(crate) fn for_polling(link: &Link) -> Link {
 
 /// What a read costs on a wire, for the planner.
 pub(crate) fn cost(endpoint: &Endpoint, profile: &Profile) -> Cost {
-    let cost = match endpoint {
-        Endpoint::Rtu { serial, .. } => {
-            Cost::rtu(serial.baud, u32::from(serial.bits_per_character()), profile.wire.answer_delay())
-        }
-        // A request is a round trip; the bytes hardly count.
-        _ => Cost::tcp(ms(5), 1_000_000),
-    };
+    // Over TCP a request is a round trip; the bytes hardly count.
+    let cost = line_cost(endpoint, profile).unwrap_or(Cost::tcp(ms(5), 1_000_000));
     cost.spaced(spacing(profile))
+}
+
+/// What a read takes of the time of a line whose speed is known.
+pub(crate) fn line_cost(endpoint: &Endpoint, profile: &Profile) -> Option<Cost> {
+    match endpoint {
+        Endpoint::Rtu { serial, .. } => {
+            let bits = u32::from(serial.bits_per_character());
+            Some(Cost::rtu(serial.baud, bits, profile.wire.answer_delay()))
+        }
+        _ => None,
+    }
 }
 
 /// A wire as the API shows it.
@@ -72,12 +81,12 @@ pub(crate) fn view(id: &str, link: &Link) -> WireView {
 }
 
 fn statistics(counted: &Statistics) -> WireStatistics {
-    let exceptions = counted.exceptions.iter();
     WireStatistics {
         requests: counted.requests,
         answers: counted.answers,
         timeouts: counted.timeouts,
-        exceptions: exceptions.map(|(code, count)| ExceptionCount { code: *code, count: *count }).collect(),
+        retries: counted.retries,
+        exceptions: exceptions(&counted.exceptions),
         late: counted.late,
         wrong_unit: counted.wrong_unit,
         wrong_function: counted.wrong_function,
@@ -89,8 +98,41 @@ fn statistics(counted: &Statistics) -> WireStatistics {
         reconnects: counted.reconnects,
         bytes_in: counted.bytes_received,
         bytes_out: counted.bytes_sent,
-        latency_ms: counted.latency.mean().map(|mean| mean.as_micros() as f64 / 1_000.0),
+        latency_ms: counted.latency.mean().map(in_ms),
     }
+}
+
+/// A wire in detail, with the plans of the devices on it.
+pub(crate) fn detail(id: &str, link: &Link, devices: &[(SiteDevice, Overview)]) -> WireDetailView {
+    let counted = link.statistics();
+    WireDetailView {
+        wire: view(id, link),
+        latency: latency(&counted.latency),
+        time: WireTime::default(),
+        units: Vec::new(),
+        plans: devices.iter().map(|(device, plan)| plan::view(link.endpoint(), device, plan)).collect(),
+    }
+}
+
+fn latency(counted: &Latency) -> LatencyView {
+    LatencyView {
+        count: counted.count(),
+        min_ms: counted.min().map(in_ms),
+        mean_ms: counted.mean().map(in_ms),
+        max_ms: counted.max().map(in_ms),
+        buckets: counted
+            .histogram()
+            .map(|(bound, count)| LatencyBucket { up_to_ms: bound.map(in_ms), count })
+            .collect(),
+    }
+}
+
+fn exceptions(counted: &BTreeMap<u8, u64>) -> Vec<ExceptionCount> {
+    counted.iter().map(|(code, count)| ExceptionCount { code: *code, count: *count }).collect()
+}
+
+fn in_ms(duration: Duration) -> f64 {
+    duration.as_micros() as f64 / 1_000.0
 }
 
 fn ms(ms: u32) -> Duration {
@@ -107,14 +149,18 @@ mod tests {
 
     fn wire() -> SiteWire {
         let endpoint = "tcp://192.0.2.7:502".parse().unwrap();
-        SiteWire { id: "w1".to_owned(), endpoint, timeout: None }
+        SiteWire { id: "w1".to_owned(), endpoint, timeout: None, spacing: None }
     }
 
     #[test]
-    fn a_wire_has_the_pace_of_the_one_device_on_it() {
+    fn a_wire_has_its_own_pause_and_the_longest_time_out_of_its_devices() {
         let datakom = busbar_profile::builtin("datakom-d").unwrap();
-        assert_eq!(options(&wire(), &[smartgen()]).spacing, ms(500));
-        assert_eq!(options(&wire(), &[smartgen(), datakom]).spacing, Duration::ZERO);
+        let hat = busbar_profile::builtin("smartgen-hat821si").unwrap();
+        let plain = options(&wire(), &[smartgen(), hat, datakom]);
+        assert_eq!((plain.spacing, plain.timeout), (Duration::ZERO, ms(1_500)));
+        let slow = SiteWire { spacing: Some(ms(20)), timeout: Some(ms(300)), ..wire() };
+        let set = options(&slow, &[hat]);
+        assert_eq!((set.spacing, set.timeout), (ms(20), ms(300)));
     }
 
     #[test]
