@@ -36,6 +36,17 @@ pub enum LinkError {
         /// How often the request was sent.
         tries: u8,
     },
+    /// A unit that has not answered for several times is polled only now and then, so that others on its wire keep
+    /// their pace; this poll was answered at once, and nothing was sent.
+    #[error(
+        "unit {unit} has not answered lately and is polled again in {next_probe:?}: check the unit id and that the device is on"
+    )]
+    Silent {
+        /// Unit id asked.
+        unit: u8,
+        /// How long until the next poll goes through, in whole milliseconds.
+        next_probe: Duration,
+    },
     /// There is no connection. A write that ends so was not sent.
     #[error("{reason}")]
     Down {
@@ -94,7 +105,7 @@ impl LinkError {
     pub fn fault(&self) -> Fault {
         match self {
             Self::Exception { .. } => Fault::Device,
-            Self::Timeout { .. } | Self::Lost { .. } => Fault::Wire,
+            Self::Timeout { .. } | Self::Silent { .. } | Self::Lost { .. } => Fault::Wire,
             Self::Down { reason } => match reason.cause {
                 Cause::Garbage | Cause::Closed => Fault::Peer,
                 _ => Fault::Wire,
@@ -264,6 +275,11 @@ mod tests {
                 LinkError::Timeout { unit: 7, after: Duration::from_millis(1500), tries: 2 },
                 Fault::Wire,
                 "unit 7 did not answer within 1.5s, asked 2 times: check the unit id and that the device is on",
+            ),
+            (
+                LinkError::Silent { unit: 7, next_probe: Duration::from_millis(3500) },
+                Fault::Wire,
+                "unit 7 has not answered lately and is polled again in 3.5s: check the unit id and that the device is on",
             ),
             (
                 LinkError::Down { reason: outage(Cause::Refused) },

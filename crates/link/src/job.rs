@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use busbar_modbus::{Registers, Request};
+use busbar_modbus::{Registers, Request, Stray};
+use thiserror::Error;
 
 use crate::error::LinkError;
 
@@ -57,26 +58,105 @@ impl Priority {
     }
 }
 
+/// Writes that belong together, cut short: the first failure ends them.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{error} (the device had acknowledged {acknowledged} of {of} writes that belong together)")]
+pub struct Interrupted {
+    /// How many the device acknowledged; the one behind them failed, and what is behind that did not leave.
+    pub acknowledged: usize,
+    /// How many were asked for.
+    pub of: usize,
+    /// What happened to the one that failed.
+    #[source]
+    pub error: LinkError,
+}
+
 /// One request of one caller, checked, and what it may cost.
 #[derive(Debug)]
 pub(crate) struct Job {
     pub(crate) unit: u8,
     pub(crate) ask: Ask,
     pub(crate) priority: Priority,
-    /// How long each try waits for its answer.
+    /// How long each try waits for its answer at most.
     pub(crate) timeout: Duration,
+    /// How long the unit is left alone before and after.
+    pub(crate) spacing: Duration,
     /// Whether fewer registers than asked for are an answer.
     pub(crate) short: bool,
     /// Where the registers of a read go: the caller's own buffer, so that nothing is allocated.
     pub(crate) registers: Vec<u16>,
 }
 
+impl Job {
+    pub(crate) fn question(&self) -> Question {
+        let (function, address, count) = match self.ask {
+            Ask::Holding { address, count } => (0x03, address, count),
+            Ask::Input { address, count } => (0x04, address, count),
+            Ask::Write(ref write) => write.addressed(),
+            Ask::Together { ref writes, done } => writes.get(done).map_or((0, 0, 0), Write::addressed),
+        };
+        Question { unit: self.unit, function, address, count, short: self.short, write: self.ask.is_write() }
+    }
+}
+
+/// What of a request tells its answer from others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Question {
+    pub(crate) unit: u8,
+    pub(crate) function: u8,
+    pub(crate) address: u16,
+    pub(crate) count: u16,
+    pub(crate) short: bool,
+    pub(crate) write: bool,
+}
+
+impl Question {
+    /// Bytes of the request's PDU.
+    pub(crate) fn request_pdu(&self) -> usize {
+        match self.function {
+            0x10 => 6 + 2 * usize::from(self.count),
+            _ => 5,
+        }
+    }
+
+    /// Bytes of the PDU of a full answer.
+    pub(crate) fn answer_pdu(&self) -> usize {
+        match self.write {
+            true => 5,
+            false => 2 + 2 * usize::from(self.count),
+        }
+    }
+
+    /// Whether only the asking tells the answers to the two apart.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let alike = self.short || other.short || self.answer_pdu() == other.answer_pdu();
+        self.unit == other.unit && self.function == other.function && alike
+    }
+
+    /// Whether this frame may be the answer.
+    pub(crate) fn may_be_answered_by(&self, frame: &Stray) -> bool {
+        let fits = frame.exception || self.short || self.answer_pdu() == frame.pdu_len;
+        self.unit == frame.unit && self.function == frame.function && fits
+    }
+}
+
 /// The request itself.
 #[derive(Debug)]
 pub(crate) enum Ask {
-    Holding { address: u16, count: u16 },
-    Input { address: u16, count: u16 },
+    Holding {
+        address: u16,
+        count: u16,
+    },
+    Input {
+        address: u16,
+        count: u16,
+    },
     Write(Write),
+    /// Writes with nothing between them, and how many of them are done; at least one is not.
+    Together {
+        writes: Vec<Write>,
+        done: usize,
+    },
 }
 
 impl Ask {
@@ -89,26 +169,62 @@ impl Ask {
     }
 
     pub(crate) fn is_write(&self) -> bool {
-        matches!(self, Self::Write(_))
+        matches!(self, Self::Write(_) | Self::Together { .. })
     }
 
-    pub(crate) fn request(&self) -> Request<'_> {
+    /// What to send next; nothing when all of it is done.
+    pub(crate) fn request(&self) -> Option<Request<'_>> {
         match *self {
-            Self::Holding { address, count } => Request::ReadHoldingRegisters { address, count },
-            Self::Input { address, count } => Request::ReadInputRegisters { address, count },
-            Self::Write(Write::Register { address, value }) => {
-                Request::WriteSingleRegister { address, value }
-            }
-            Self::Write(Write::Registers { address, ref values }) => {
+            Self::Holding { address, count } => Some(Request::ReadHoldingRegisters { address, count }),
+            Self::Input { address, count } => Some(Request::ReadInputRegisters { address, count }),
+            Self::Write(ref write) => Some(write.request()),
+            Self::Together { ref writes, done } => writes.get(done).map(Write::request),
+        }
+    }
+
+    /// What was sent is done. Says whether there is more to send.
+    pub(crate) fn advance(&mut self) -> bool {
+        let Self::Together { writes, done } = self else {
+            return false;
+        };
+        *done += 1;
+        *done < writes.len()
+    }
+
+    /// How many of the writes that belong together are done.
+    pub(crate) fn done(&self) -> usize {
+        match self {
+            Self::Together { done, .. } => *done,
+            _ => 0,
+        }
+    }
+}
+
+impl Write {
+    fn request(&self) -> Request<'_> {
+        match *self {
+            Self::Register { address, value } => Request::WriteSingleRegister { address, value },
+            Self::Registers { address, ref values } => {
                 Request::WriteMultipleRegisters { address, registers: Registers::from(values.as_slice()) }
             }
-            Self::Write(Write::Coil { address, on }) => Request::WriteSingleCoil {
+            Self::Coil { address, on } => Request::WriteSingleCoil {
                 address,
                 value: match on {
                     true => 0xFF00,
                     false => 0x0000,
                 },
             },
+        }
+    }
+
+    /// Function, address and how many.
+    fn addressed(&self) -> (u8, u16, u16) {
+        match *self {
+            Self::Register { address, .. } => (0x06, address, 1),
+            Self::Registers { address, ref values } => {
+                (0x10, address, u16::try_from(values.len()).unwrap_or(u16::MAX))
+            }
+            Self::Coil { address, .. } => (0x05, address, 1),
         }
     }
 }
@@ -118,4 +234,6 @@ impl Ask {
 pub(crate) struct Outcome {
     pub(crate) result: Result<(), LinkError>,
     pub(crate) registers: Vec<u16>,
+    /// How many of the writes that belong together are done.
+    pub(crate) done: usize,
 }

@@ -5,19 +5,35 @@
 //! request at a time, and takes nothing for an answer that does not answer that request.
 //!
 //! - **Reads are retried, writes never.** A write leaves at most once. If its answer is lost, the caller learns just
-//!   that ([`LinkError::Lost`]) and finds out by reading.
+//!   that ([`LinkError::Lost`]) and finds out by reading. Writes that [belong together](Link::write_together) leave with
+//!   nothing between them, and the first failure ends them.
 //! - **A dead connection holds nobody up.** While a wire is down requests fail at once with the reason; while it is
 //!   being connected they wait as long as they would wait for an answer.
-//! - **A silent unit holds nobody up either.** It is polled again behind everybody else, and the connection is not
-//!   blamed for it while others on the wire answer.
-//! - **Commands go first**, then what a person waits for, then polling ([`Priority`]).
+//! - **A silent unit holds nobody up either.** After three time-outs in a row it is polled only in slots of its own that
+//!   grow from one second to thirty ([`Options::probes`]); other polls of it fail at once ([`LinkError::Silent`]).
+//!   What a person or a command asks goes through at once, and any answer, even a late one, ends the silence. The
+//!   connection is not blamed for a silent unit while others on the wire answer. Where nobody answers, there is nobody
+//!   to protect and the connection is made anew.
+//! - **Commands go first**, then what a person waits for, then polling ([`Priority`]). Within one of these the unit that
+//!   was served longest ago goes first.
+//! - **A unit has its pause** ([`Link::with_spacing`]) from the end of its last exchange; others use the time.
+//! - **A read waits as long as its unit's latency suggests**, from [`Options::timeout_floor`] to the time-out of the
+//!   request, twice as long after each time-out. A write always waits the whole time-out. On a serial line the time of
+//!   the characters comes on top.
+//! - **A serial line is kept legal and tight.** A request leaves 3.5 characters after the last byte heard, whoever it
+//!   was from, and no later. The gaps inside what is received mean nothing, because adapters deliver in pieces.
+//! - **A late answer is nobody else's.** Over TCP its transaction tells. On RTU only unit, function and length do: so
+//!   while the answer to a lost request may still come, for twice the time-out, its unit is asked nothing else whose
+//!   answer looks the same. The same read may be asked again: either answer is right.
 //!
 //! Inside, `wire` holds every rule as a pure state machine that is given the time; `shared` puts it and the connection
 //! behind one lock; `task` connects and keeps time.
 
+mod doubt;
 mod endpoint;
 mod error;
 mod job;
+mod line;
 mod link;
 mod options;
 mod port;
@@ -26,13 +42,15 @@ mod shared;
 mod silence;
 mod statistics;
 mod task;
+mod timing;
 mod trace;
+mod unit;
 mod wire;
 
 pub use endpoint::{Endpoint, EndpointError, EndpointProblem, Parity, Serial, StopBits};
 pub use error::{Cause, Fault, LinkError, Loss, OpenError, Outage};
-pub use job::{Priority, Write};
+pub use job::{Interrupted, Priority, Write};
 pub use link::{Link, WireState};
 pub use options::{Backoff, Options};
-pub use statistics::{Latency, Statistics};
+pub use statistics::{Latency, Statistics, UnitState, UnitStatistics};
 pub use trace::{Direction, Trace, TraceEvent};

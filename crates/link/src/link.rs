@@ -6,13 +6,13 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::{Duration, SystemTime};
 
-use busbar_modbus::Framing;
 use tokio::runtime::Handle;
 use tokio::sync::watch;
 
 use crate::endpoint::Endpoint;
 use crate::error::{LinkError, OpenError, Outage};
-use crate::job::{Ask, Job, Outcome, Priority, Write};
+use crate::job::{Ask, Interrupted, Job, Outcome, Priority, Write};
+use crate::line::Line;
 use crate::options::Options;
 use crate::queue::Ticket;
 use crate::shared::Shared;
@@ -26,6 +26,7 @@ pub struct Link {
     owner: Arc<Owner>,
     priority: Priority,
     timeout: Duration,
+    spacing: Duration,
     short: bool,
 }
 
@@ -33,23 +34,27 @@ impl Link {
     /// Opens a wire and starts to connect. Whether it is up is seen from [`Self::state`] or the first request.
     ///
     /// # Errors
-    /// [`OpenError::NotSpoken`] for endpoints other than `tcp://`, [`OpenError::NoPort`] for port 0,
-    /// [`OpenError::NoRuntime`] outside a tokio runtime.
+    /// [`OpenError::NotSpoken`] for `tls://` endpoints, [`OpenError::NoPort`] for port 0, [`OpenError::NoRuntime`]
+    /// outside a tokio runtime.
     pub fn open(endpoint: Endpoint, options: Options) -> Result<Self, OpenError> {
-        match endpoint {
-            Endpoint::Tcp { port: 0, .. } => return Err(OpenError::NoPort { endpoint }),
-            Endpoint::Tcp { .. } => {}
-            _ => return Err(OpenError::NotSpoken { endpoint }),
-        }
+        let line = match &endpoint {
+            Endpoint::Tcp { port: 0, .. } | Endpoint::RtuTcp { port: 0, .. } => {
+                return Err(OpenError::NoPort { endpoint });
+            }
+            Endpoint::Tcp { .. } => Line::tcp(),
+            Endpoint::Rtu { serial, .. } => Line::rtu(serial),
+            Endpoint::RtuTcp { .. } => Line::tunnelled(),
+            Endpoint::Tls { .. } => return Err(OpenError::NotSpoken { endpoint }),
+        };
         let runtime = Handle::try_current().map_err(|_| OpenError::NoRuntime)?;
 
         let endpoint = Arc::new(endpoint);
-        let wire = Wire::new(Arc::clone(&endpoint), Framing::Tcp, &options);
+        let wire = Wire::new(Arc::clone(&endpoint), line, &options);
         let shared = Arc::new(Shared::new(wire, options.trace.is_some()));
         let timeout = options.timeout;
         runtime.spawn(Task::new(Arc::clone(&shared), Arc::clone(&endpoint), options));
         let owner = Arc::new(Owner { shared, endpoint });
-        Ok(Self { owner, priority: Priority::Person, timeout, short: false })
+        Ok(Self { owner, priority: Priority::Person, timeout, spacing: Duration::ZERO, short: false })
     }
 
     /// The same wire for requests of another priority. A link starts as [`Priority::Person`].
@@ -58,10 +63,18 @@ impl Link {
         Self { priority, ..self.clone() }
     }
 
-    /// The same wire for requests with another time-out than [`Options::timeout`].
+    /// The same wire for requests with another time-out than [`Options::timeout`]: the longest that each of them waits.
     #[must_use]
     pub fn with_timeout(&self, timeout: Duration) -> Self {
         Self { timeout, ..self.clone() }
+    }
+
+    /// The same wire for a unit that wants to be left alone so long between the end of one exchange and the next
+    /// request. It is kept by unit, whichever handle the exchange before was of; other units use the time. Commands
+    /// keep it too, and go first when it is over.
+    #[must_use]
+    pub fn with_spacing(&self, spacing: Duration) -> Self {
+        Self { spacing, ..self.clone() }
     }
 
     /// The same wire for reads that may also be answered by fewer registers than they ask for, where the device is
@@ -109,6 +122,7 @@ impl Link {
             ask: Ask::read(function, address, count)?,
             priority: self.priority,
             timeout: self.timeout,
+            spacing: self.spacing,
             short: self.short,
             registers: std::mem::take(registers),
         };
@@ -130,20 +144,41 @@ impl Link {
     ///   have taken effect.
     /// - [`LinkError::Down`], [`LinkError::QueueFull`], [`LinkError::NotSent`], [`LinkError::Closed`]: nothing left.
     pub async fn write(&self, unit: u8, write: Write) -> Result<(), LinkError> {
-        let job = Job {
+        self.ask(self.command(unit, Ask::Write(write))).await.result
+    }
+
+    /// Sends writes that belong together: nothing else leaves between them, on the whole wire. Each leaves at most once,
+    /// when the one before it was acknowledged; the first failure ends them. The unit has its
+    /// [pause](Self::with_spacing) between them too.
+    ///
+    /// # Errors
+    /// [`Interrupted`] says how many were acknowledged, and why the next one was not, as [`Self::write`] has it.
+    pub async fn write_together(&self, unit: u8, writes: Vec<Write>) -> Result<(), Interrupted> {
+        let of = writes.len();
+        if of == 0 {
+            return Ok(());
+        }
+        let outcome = self.ask(self.command(unit, Ask::Together { writes, done: 0 })).await;
+        outcome.result.map_err(|error| Interrupted { acknowledged: outcome.done, of, error })
+    }
+
+    fn command(&self, unit: u8, ask: Ask) -> Job {
+        Job {
             unit,
-            ask: Ask::Write(write),
+            ask,
             priority: Priority::Command,
             timeout: self.timeout,
+            spacing: self.spacing,
             short: false,
             registers: Vec::new(),
-        };
-        self.ask(job).await.result
+        }
     }
 
     /// Everything the wire has counted so far.
     pub fn statistics(&self) -> Statistics {
-        self.owner.shared.lock().wire.statistics()
+        let shared = &self.owner.shared;
+        let now = shared.now();
+        shared.lock().wire.statistics(now)
     }
 
     /// The state of the connection, and its changes.

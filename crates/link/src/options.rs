@@ -10,9 +10,14 @@ pub struct Options {
     /// How long an attempt to connect to one address may take. A host name may have several, and each is tried so long;
     /// to look them up may take as long again.
     pub connect_timeout: Duration,
-    /// How long each try of a request waits for its answer.
+    /// How long each try of a request waits for its answer at most. Writes, and the first requests to a unit, wait so
+    /// long; reads wait as the unit's measured latency suggests.
     pub timeout: Duration,
-    /// Least time between the end of one exchange and the next request.
+    /// The shortest that a read waits for its answer, however fast the unit is. From `timeout` on, latency changes
+    /// nothing.
+    pub timeout_floor: Duration,
+    /// Least time between the end of one exchange and the next request, whichever unit it is for. For the pause that
+    /// one unit wants, see [`Link::with_spacing`](crate::Link::with_spacing).
     pub spacing: Duration,
     /// How often a read is sent again after a time-out or a drop. A unit that did not answer last time gets one try
     /// while others on the wire answer. Writes are never sent again.
@@ -20,10 +25,12 @@ pub struct Options {
     /// Most requests that may wait in each class of priority.
     pub queue: usize,
     /// After so many time-outs in a row the connection is taken for dead and made anew, unless a unit that may still
-    /// answer was not asked among them.
+    /// answer was not asked among them. A serial line is no connection, and is never taken for dead.
     pub timeouts_to_drop: u32,
     /// How long to wait before a connection that failed is tried again, or one that dropped before it had proved good.
     pub backoff: Backoff,
+    /// How long a unit that is silent is left alone between two polls, while others on the wire answer.
+    pub probes: Backoff,
     /// Sees every frame, both ways.
     pub trace: Option<Trace>,
 }
@@ -33,11 +40,14 @@ impl Default for Options {
         Self {
             connect_timeout: Duration::from_secs(3),
             timeout: Duration::from_secs(1),
+            // SmartGen asks for more than 200 ms; the time of the characters comes on top.
+            timeout_floor: Duration::from_millis(200),
             spacing: Duration::ZERO,
             retries: 1,
             queue: 64,
             timeouts_to_drop: 3,
             backoff: Backoff::default(),
+            probes: Backoff { first: Duration::from_secs(1), max: Duration::from_secs(30) },
             trace: None,
         }
     }

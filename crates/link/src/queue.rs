@@ -29,7 +29,27 @@ impl Ticket {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place(usize);
 
-/// Jobs by priority, first come first served within one.
+/// When a job may leave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Turn {
+    /// Now; of several the one with the least number goes first, and among equals the one that came first.
+    Now(u64),
+    /// Not before this.
+    At(Duration),
+}
+
+/// What to do next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Pick {
+    /// Send this job. It keeps its slot until it is finished or put back.
+    Job(Place),
+    /// Nobody's turn comes before this.
+    Wait(Duration),
+    /// Nobody waits.
+    Nobody,
+}
+
+/// Jobs by priority. Within one, whose turn it is says the wire, which knows the units.
 ///
 /// Slots are used again and the lists run through them, so a wire in its stride allocates nothing and touches little.
 #[derive(Debug)]
@@ -90,17 +110,50 @@ impl Queue {
         Ticket(index)
     }
 
-    /// The job whose turn it is. It keeps its slot until it is finished or put back.
-    pub(crate) fn pop(&mut self, now: Duration) -> Option<Place> {
+    /// The job whose turn it is, judged by `turn`. Where nobody's turn has come in a class, the next one uses the time.
+    pub(crate) fn pick(&mut self, now: Duration, mut turn: impl FnMut(&Entry) -> Turn) -> Pick {
         let mut order = [0, 1, 2, PROBES];
         if self.probe_is_due(now) {
             order.swap(2, PROBES);
         }
+        let mut wait: Option<Duration> = None;
+        for class in order {
+            match self.pick_in(class, &mut turn) {
+                Pick::Job(place) => {
+                    self.probed = class == PROBES;
+                    return Pick::Job(place);
+                }
+                Pick::Wait(until) => wait = Some(wait.map_or(until, |wait| wait.min(until))),
+                Pick::Nobody => {}
+            }
+        }
+        wait.map_or(Pick::Nobody, Pick::Wait)
+    }
+
+    fn pick_in(&mut self, class: usize, turn: &mut impl FnMut(&Entry) -> Turn) -> Pick {
         let Self { slots, waiting, .. } = self;
-        let (class, index) =
-            order.into_iter().find_map(|class| Some((class, waiting[class].pop_front(slots)?)))?;
-        self.probed = class == PROBES;
-        Some(Place(index))
+        let list = &mut waiting[class];
+        let mut wait: Option<Duration> = None;
+        let mut best: Option<(u64, Option<usize>, usize)> = None;
+        let mut before = None;
+        for index in list.indexes(slots) {
+            match turn(&slots[index].entry) {
+                Turn::Now(number) if best.is_none_or(|(least, ..)| number < least) => {
+                    best = Some((number, before, index));
+                }
+                Turn::Now(_) => {}
+                Turn::At(at) => wait = Some(wait.map_or(at, |wait| wait.min(at))),
+            }
+            before = Some(index);
+        }
+        match (best, wait) {
+            (Some((_, before, index)), _) => {
+                list.unlink(slots, before, index);
+                Pick::Job(Place(index))
+            }
+            (None, Some(until)) => Pick::Wait(until),
+            (None, None) => Pick::Nobody,
+        }
     }
 
     /// Puts a popped job behind the others of its class: its next try.
@@ -180,6 +233,7 @@ impl Queue {
         let outcome = Outcome {
             result: std::mem::replace(&mut slot.result, Ok(())),
             registers: std::mem::take(&mut slot.entry.job.registers),
+            done: slot.entry.job.ask.done(),
         };
         self.release(ticket.0);
         Poll::Ready(outcome)
@@ -299,6 +353,19 @@ impl List {
         found
     }
 
+    /// Takes one out that stands behind `before`.
+    fn unlink(&mut self, slots: &mut [Slot], before: Option<usize>, index: usize) {
+        let next = slots[index].next;
+        match before {
+            Some(before) => slots[before].next = next,
+            None => self.first = next,
+        }
+        if next.is_none() {
+            self.last = before.unwrap_or_default();
+        }
+        self.length -= 1;
+    }
+
     fn indexes<'a>(&self, slots: &'a [Slot]) -> impl Iterator<Item = usize> + use<'a> {
         std::iter::successors(self.first, |index| slots[*index].next)
     }
@@ -315,6 +382,7 @@ mod tests {
             ask: Ask::Holding { address, count: 1 },
             priority,
             timeout: Duration::from_secs(1),
+            spacing: Duration::ZERO,
             short: false,
             registers: vec![address],
         };
@@ -334,7 +402,14 @@ mod tests {
     }
 
     fn drain_at(queue: &mut Queue, now: Duration) -> Vec<u16> {
-        std::iter::from_fn(|| queue.pop(now).map(|place| address(queue.entry(place).unwrap()))).collect()
+        std::iter::from_fn(|| pop(queue, now).map(|place| address(queue.entry(place).unwrap()))).collect()
+    }
+
+    fn pop(queue: &mut Queue, now: Duration) -> Option<Place> {
+        match queue.pick(now, |_| Turn::Now(0)) {
+            Pick::Job(place) => Some(place),
+            Pick::Wait(_) | Pick::Nobody => None,
+        }
     }
 
     #[test]
@@ -356,7 +431,7 @@ mod tests {
 
         let mut wakes = Vec::new();
         queue.fail_waiting(|entry| address(entry).is_multiple_of(2).then_some(LinkError::Closed), &mut wakes);
-        let first = queue.pop(Duration::ZERO).unwrap();
+        let first = pop(&mut queue, Duration::ZERO).unwrap();
         queue.put_back(first);
         assert_eq!(drain(&mut queue), [3, 9, 1], "a second try comes last");
         assert!(queue.is_empty());
@@ -387,19 +462,43 @@ mod tests {
     }
 
     #[test]
+    fn takes_whose_turn_it_is_and_leaves_the_others_in_order() {
+        let mut queue = Queue::new(8);
+        for number in 1..=6 {
+            queue.push(entry(Priority::Poll, number));
+        }
+        let at = Duration::from_secs;
+        // Even ones wait for their own second, odd ones go backwards.
+        let turn = |entry: &Entry| match address(entry) {
+            number if number % 2 == 0 => Turn::At(at(number.into())),
+            number => Turn::Now(100 - u64::from(number)),
+        };
+        for number in [5, 3, 1] {
+            let Pick::Job(place) = queue.pick(at(0), turn) else { panic!("nobody's turn") };
+            assert_eq!(address(queue.entry(place).unwrap()), number);
+        }
+        assert_eq!(queue.pick(at(0), turn), Pick::Wait(at(2)));
+        queue.push(entry(Priority::Person, 8));
+        assert_eq!(queue.pick(at(0), turn), Pick::Wait(at(2)), "whichever class it is");
+        queue.push(entry(Priority::Poll, 9));
+        assert_eq!(drain(&mut queue), [8, 2, 4, 6, 9], "nobody was lost");
+        assert_eq!(queue.pick(at(0), turn), Pick::Nobody);
+    }
+
+    #[test]
     fn gives_the_buffer_back_with_the_result() {
         let mut queue = Queue::new(1);
         let ticket = queue.push(entry(Priority::Person, 7));
         assert_eq!(queue.room(Priority::Person), Err(LinkError::QueueFull { waiting: 1 }));
         assert_eq!(queue.room(Priority::Poll), Ok(()));
-        let place = queue.pop(Duration::ZERO).unwrap();
+        let place = pop(&mut queue, Duration::ZERO).unwrap();
         queue.finish(place, Err(LinkError::Closed), &mut Vec::new());
         // What ends twice keeps its first end.
         queue.finish(place, Ok(()), &mut Vec::new());
         let Poll::Ready(outcome) = queue.take(&ticket, Waker::noop()) else {
             panic!("not done");
         };
-        assert_eq!(outcome, Outcome { result: Err(LinkError::Closed), registers: vec![7] });
+        assert_eq!(outcome, Outcome { result: Err(LinkError::Closed), registers: vec![7], done: 0 });
         assert_eq!(queue.push(entry(Priority::Poll, 8)), ticket, "its slot is free");
     }
 }

@@ -39,8 +39,94 @@ pub struct Statistics {
     pub bytes_sent: u64,
     /// Bytes received.
     pub bytes_received: u64,
+    /// Polls of silent units that were answered at once, without a frame.
+    pub held: u64,
+    /// Own requests that a converter sent back, and that were taken out of what it sent.
+    pub echoes: u64,
     /// Time from a request to its answer.
     pub latency: Latency,
+    /// How long the wire has been open.
+    pub open_for: Duration,
+    /// How long bytes were on the line, both ways, by its speed; zero where that is not known, as on TCP.
+    pub busy: Duration,
+    /// How long answers were waited for, their own bytes not counted.
+    pub waiting: Duration,
+    /// The same by unit, in the order of their ids; those that were never asked are not among them.
+    pub units: Vec<UnitStatistics>,
+}
+
+impl Statistics {
+    /// Adds what was counted for a unit to the sums.
+    pub(crate) fn add(&mut self, unit: UnitStatistics) {
+        self.requests += unit.requests;
+        self.answers += unit.answers;
+        self.timeouts += unit.timeouts;
+        self.retries += unit.retries;
+        self.held += unit.held;
+        self.bytes_sent += unit.bytes_sent;
+        self.bytes_received += unit.bytes_received;
+        self.waiting += unit.waiting;
+        self.latency.add(&unit.latency);
+        for (code, count) in &unit.exceptions {
+            *self.exceptions.entry(*code).or_default() += count;
+        }
+        self.units.push(unit);
+    }
+}
+
+/// What a wire has counted for one of its units.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct UnitStatistics {
+    /// Its id.
+    pub unit: u8,
+    /// What it did when it was asked last.
+    pub state: UnitState,
+    /// Frames sent to it, each try of a read by itself.
+    pub requests: u64,
+    /// Its answers, exceptions included.
+    pub answers: u64,
+    /// Requests that it did not answer in time.
+    pub timeouts: u64,
+    /// Reads that were sent once more, after a time-out or a drop.
+    pub retries: u64,
+    /// Polls that were answered at once while it was silent, without a frame.
+    pub held: u64,
+    /// Its exceptions by code.
+    pub exceptions: BTreeMap<u8, u64>,
+    /// Frames with a bad checksum that came while its answer was due (RTU).
+    pub crc_errors: u64,
+    /// Bytes that belong to no frame and came while its answer was due (RTU).
+    pub garbage_bytes: u64,
+    /// Its frames that answered nothing any more.
+    pub late: u64,
+    /// Bytes sent to it.
+    pub bytes_sent: u64,
+    /// Bytes received while its answer was due.
+    pub bytes_received: u64,
+    /// Time from a request to its answer.
+    pub latency: Latency,
+    /// How long these bytes were on the line, by its speed; zero where that is not known, as on TCP.
+    pub busy: Duration,
+    /// How long its answers were waited for, their own bytes not counted.
+    pub waiting: Duration,
+}
+
+/// What a unit did when it was asked last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum UnitState {
+    /// It was not asked yet, or its first answer is still due.
+    Unknown,
+    /// It answered.
+    Answering,
+    /// It did not.
+    Missing,
+    /// It has not for several times, and is asked only now and then, so that the others keep their pace.
+    Silent {
+        /// How long until it is polled again; zero when the next poll goes through.
+        next_probe: Duration,
+    },
 }
 
 /// How long answers took.
@@ -97,6 +183,18 @@ impl Latency {
         bounds.zip(self.buckets)
     }
 
+    fn add(&mut self, other: &Self) {
+        self.min = match (self.count, other.count) {
+            (0, _) => other.min,
+            (_, 0) => self.min,
+            _ => self.min.min(other.min),
+        };
+        self.max = self.max.max(other.max);
+        self.total += other.total;
+        self.count += other.count;
+        self.buckets.iter_mut().zip(other.buckets).for_each(|(bucket, count)| *bucket += count);
+    }
+
     pub(crate) fn record(&mut self, latency: Duration) {
         self.min = match self.count {
             0 => latency,
@@ -137,5 +235,12 @@ mod tests {
                 (None, 1),
             ]
         );
+
+        let mut sum = Latency::default();
+        sum.add(&latency);
+        sum.add(&Latency::default());
+        assert_eq!(sum, latency);
+        sum.add(&latency);
+        assert_eq!((sum.count(), sum.min(), sum.mean()), (8, latency.min(), latency.mean()));
     }
 }

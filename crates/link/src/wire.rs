@@ -3,19 +3,25 @@
 //! It has no clock and no socket, so every rule is tested as a script. `shared` does what it says and tells it what
 //! happened.
 
+mod exchange;
+
 use std::sync::Arc;
 use std::task::{Poll, Waker};
 use std::time::Duration;
 
-use busbar_modbus::{Client, Framing, Progress, Response};
+use busbar_modbus::{Client, Progress};
 
+use crate::doubt::Doubts;
 use crate::endpoint::Endpoint;
 use crate::error::{Cause, LinkError, Loss, Outage};
 use crate::job::{Job, Outcome, Priority};
+use crate::line::Line;
 use crate::options::{Backoff, Options};
-use crate::queue::{Entry, Place, Queue, Ticket};
+use crate::queue::{Entry, Pick, Place, Queue, Ticket, Turn};
 use crate::silence::Silence;
 use crate::statistics::Statistics;
+use crate::unit::Units;
+use exchange::{Exchange, Sent};
 
 /// Longer waits are cut to this, so that no sum of times overflows.
 const LONGEST_WAIT: Duration = Duration::from_secs(24 * 60 * 60);
@@ -30,13 +36,20 @@ const PROVEN_ANSWERS: u64 = 100;
 pub(crate) struct Wire {
     endpoint: Arc<Endpoint>,
     rules: Rules,
+    line: Line,
     client: Client,
     queue: Queue,
     phase: Phase,
     exchange: Option<Exchange>,
-    /// No request leaves before this: spacing.
+    /// Writes that belong together, in the middle of which nothing else leaves.
+    together: Option<Place>,
+    /// No request leaves before this: spacing, and the silence of the line.
     earliest: Duration,
+    units: Units,
     silence: Silence,
+    doubts: Doubts,
+    /// Exchanges started, which says what was served last.
+    started: u64,
     /// Connections that failed since the last one that proved good.
     failures: u32,
     /// The connection in use is no good any more, and the task does not know yet.
@@ -46,35 +59,49 @@ pub(crate) struct Wire {
     closed: bool,
     connections: u64,
     connected_at: Duration,
-    /// Answers before this connection.
-    answers_before: u64,
-    statistics: Statistics,
+    /// Answers on this connection.
+    answers: u64,
+    /// Bytes that came while no answer was due.
+    unasked_bytes: u64,
+    /// Bad checksums and bytes of no frame that were put down to somebody.
+    damage: (u64, u64),
+    /// Own requests that came back; the port takes them out.
+    pub(crate) echoes: u64,
 }
 
 impl Wire {
-    pub(crate) fn new(endpoint: Arc<Endpoint>, framing: Framing, options: &Options) -> Self {
+    pub(crate) fn new(endpoint: Arc<Endpoint>, line: Line, options: &Options) -> Self {
         Self {
             endpoint,
             rules: Rules {
                 spacing: options.spacing.min(LONGEST_WAIT),
                 retries: options.retries,
                 timeouts_to_drop: options.timeouts_to_drop,
+                timeout_floor: options.timeout_floor,
                 backoff: options.backoff,
+                probes: options.probes,
             },
-            client: Client::new(framing),
+            line,
+            client: Client::new(line.framing),
             queue: Queue::new(options.queue),
             phase: Phase::Connecting { trying: false, since: Duration::ZERO },
             exchange: None,
+            together: None,
             earliest: Duration::ZERO,
+            units: Units::default(),
             silence: Silence::default(),
+            doubts: Doubts::default(),
+            started: 0,
             failures: 0,
             hang_up: false,
             news: false,
             closed: false,
             connections: 0,
             connected_at: Duration::ZERO,
-            answers_before: 0,
-            statistics: Statistics::default(),
+            answers: 0,
+            unasked_bytes: 0,
+            damage: (0, 0),
+            echoes: 0,
         }
     }
 
@@ -82,10 +109,11 @@ impl Wire {
 
     /// Takes a job in, or refuses it at once.
     pub(crate) fn submit(&mut self, now: Duration, job: Job, waker: &Waker) -> Result<Ticket, Outcome> {
-        if let Err(error) = self.accepts(job.priority) {
-            return Err(Outcome { result: Err(error), registers: job.registers });
+        if let Err(error) = self.accepts(now, job.unit, job.priority) {
+            return Err(Outcome { result: Err(error), registers: job.registers, done: 0 });
         }
-        let job = Job { timeout: job.timeout.min(LONGEST_WAIT), ..job };
+        let (timeout, spacing) = (job.timeout.min(LONGEST_WAIT), job.spacing.min(LONGEST_WAIT));
+        let job = Job { timeout, spacing, ..job };
         let probe = job.priority == Priority::Poll && !self.silence.is_answering(job.unit);
         Ok(self.queue.push(Entry { job, since: now, tries: 0, probe, waker: Some(waker.clone()) }))
     }
@@ -112,10 +140,13 @@ impl Wire {
         self.closed = true;
         if let Some(exchange) = self.exchange.take() {
             let error = match exchange.may_have_left() {
-                true => LinkError::Lost { unit: exchange.unit, loss: Loss::Closed },
+                true => LinkError::Lost { unit: exchange.unit(), loss: Loss::Closed },
                 false => LinkError::Closed,
             };
             self.queue.finish(exchange.place, Err(error), wakes);
+        }
+        if let Some(place) = self.together.take() {
+            self.queue.finish(place, Err(LinkError::Closed), wakes);
         }
         self.queue.fail_waiting(|_| Some(LinkError::Closed), wakes);
     }
@@ -132,13 +163,14 @@ impl Wire {
 
     /// Whether the task has nothing to do: nobody waits, and the connection is as it was.
     pub(crate) fn is_at_rest(&self) -> bool {
-        matches!(self.phase, Phase::Connected) && !self.hang_up && !self.news && self.queue.is_empty()
+        let nobody_waits = self.queue.is_empty() && self.together.is_none();
+        matches!(self.phase, Phase::Connected) && !self.hang_up && !self.news && nobody_waits
     }
 
     /// A copy of everything counted.
-    pub(crate) fn statistics(&self) -> Statistics {
+    pub(crate) fn statistics(&self, now: Duration) -> Statistics {
         let seen = self.client.counters();
-        Statistics {
+        let mut statistics = Statistics {
             late: seen.late,
             wrong_unit: seen.wrong_unit,
             wrong_function: seen.wrong_function,
@@ -147,9 +179,19 @@ impl Wire {
             wrong_protocol: seen.wrong_protocol,
             crc_errors: seen.crc_errors,
             garbage_bytes: seen.garbage_bytes,
+            bytes_received: self.unasked_bytes,
             reconnects: self.connections.saturating_sub(1),
-            ..self.statistics.clone()
+            echoes: self.echoes,
+            open_for: now,
+            ..Statistics::default()
+        };
+        let slots = self.has_slots();
+        for unit in self.units.iter() {
+            let busy = self.line.time(unit.counts.bytes_sent + unit.counts.bytes_received);
+            statistics.add(unit.statistics(now, busy, slots));
         }
+        statistics.busy = self.line.time(statistics.bytes_sent + statistics.bytes_received);
+        statistics
     }
 
     // What the task reports.
@@ -160,7 +202,9 @@ impl Wire {
         self.silence.begin();
         self.connections += 1;
         self.connected_at = now;
-        self.answers_before = self.statistics.answers;
+        self.answers = 0;
+        // Behind a new connection things may have changed.
+        self.units.iter_mut().for_each(|unit| unit.next_probe = Duration::ZERO);
         self.enter(Phase::Connected);
     }
 
@@ -177,7 +221,11 @@ impl Wire {
         }
         self.client.reset();
         if let Some(exchange) = self.exchange.take() {
-            self.drop_exchange(&exchange, cause, wakes);
+            self.drop_exchange(now, &exchange, cause, wakes);
+        }
+        if let Some(place) = self.together.take() {
+            let reason = self.outage(cause);
+            self.queue.finish(place, Err(LinkError::Down { reason }), wakes);
         }
         // Peers close idle connections, and that is nothing to report: one attempt at once. Nor is the first short
         // connection, but the next one has to wait.
@@ -199,11 +247,14 @@ impl Wire {
 
     /// Bytes came.
     pub(crate) fn received(&mut self, now: Duration, bytes: &[u8], wakes: &mut Vec<Waker>) {
-        self.statistics.bytes_received += bytes.len() as u64;
+        self.hear(now, bytes);
         match self.client.receive(now, bytes) {
             Progress::Answered => self.answered(now, wakes),
             Progress::TimedOut => self.timed_out(now, wakes),
             Progress::Pending | Progress::Broken(_) => {}
+        }
+        while let Some(stray) = self.client.take_stray() {
+            self.strayed(now, &stray);
         }
         // An answer may stand in front of the bytes that break the stream.
         if self.client.fault().is_some() {
@@ -269,17 +320,10 @@ impl Wire {
         out: &mut Vec<u8>,
         wakes: &mut Vec<Waker>,
     ) -> Option<Duration> {
-        let free = matches!(self.phase, Phase::Connected) && self.exchange.is_none();
-        if self.closed || self.hang_up || !free || now < self.earliest {
-            return None;
+        match self.start_or_wait(now, out, wakes) {
+            Start::Sent(until) => Some(until),
+            Start::Wait(_) => None,
         }
-        while let Some(place) = self.queue.pop(now) {
-            match self.start(now, place, out) {
-                Ok(()) => return self.client.deadline(),
-                Err(error) => self.queue.finish(place, Err(error), wakes),
-            }
-        }
-        None
     }
 
     /// The phase, if it has changed since this was last asked.
@@ -287,144 +331,104 @@ impl Wire {
         std::mem::take(&mut self.news).then_some(&self.phase)
     }
 
-    fn accepts(&self, priority: Priority) -> Result<(), LinkError> {
+    fn accepts(&mut self, now: Duration, unit: u8, priority: Priority) -> Result<(), LinkError> {
         if self.closed {
             return Err(LinkError::Closed);
         }
         if let Phase::Down { reason, .. } = &self.phase {
             return Err(LinkError::Down { reason: reason.clone() });
         }
-        self.queue.room(priority)
-    }
-
-    fn step_connected(&mut self, now: Duration, out: &mut Vec<u8>, wakes: &mut Vec<Waker>) -> Step {
-        if self.exchange.is_some() {
-            if self.client.expire(now) != Progress::TimedOut {
-                return Step::Wait(self.client.deadline());
-            }
-            self.timed_out(now, wakes);
-            if std::mem::take(&mut self.hang_up) {
-                return Step::Disconnect;
-            }
+        self.queue.room(priority)?;
+        if priority != Priority::Poll || !self.has_slots() {
+            return Ok(());
         }
-        match self.start_next(now, out, wakes) {
-            Some(until) => Step::Send(Some(until)),
-            None if self.queue.is_empty() => Step::Wait(None),
-            None => Step::Wait(Some(self.earliest)),
-        }
-    }
-
-    fn start(&mut self, now: Duration, place: Place, out: &mut Vec<u8>) -> Result<(), LinkError> {
-        let Some(entry) = self.queue.entry(place) else {
-            return Err(LinkError::Closed);
+        let Some(unit) = self.units.get_mut(unit).filter(|unit| unit.is_silent()) else {
+            return Ok(());
         };
-        let job = &entry.job;
-        self.client.start(now, job.unit, &job.ask.request(), job.timeout, out)?;
-        if job.short {
-            self.client.accept_short();
+        if now < unit.next_probe {
+            unit.counts.held += 1;
+            return Err(silent(now, unit.id, unit.next_probe));
         }
-        self.statistics.requests += 1;
-        self.statistics.retries += u64::from(entry.tries > 0);
-        self.statistics.bytes_sent += out.len() as u64;
-        entry.tries += 1;
-        self.exchange = Some(Exchange {
-            place,
-            unit: job.unit,
-            write: job.ask.is_write(),
-            timeout: job.timeout,
-            tries: entry.tries,
-            started: now,
-            sent: Sent::Whole,
-        });
+        // This poll takes the slot.
+        unit.next_probe = now + self.rules.probes.delay(unit.probes()).min(LONGEST_WAIT);
         Ok(())
     }
 
-    fn answered(&mut self, now: Duration, wakes: &mut Vec<Waker>) {
-        let Some(response) = self.client.response() else {
-            // It said that there is one.
-            return self.hang_up(now, Cause::Garbage, wakes);
-        };
-        let Some(exchange) = self.exchange.take() else { return };
-        self.silence.answered(exchange.unit);
-        self.earliest = now + self.rules.spacing;
-        self.statistics.answers += 1;
-        self.statistics.latency.record(now.saturating_sub(exchange.started));
+    /// Whether silent units are polled in slots only: where others answer, who are held up otherwise, and on a serial
+    /// line, where there is no connection whose end would help.
+    fn has_slots(&self) -> bool {
+        self.line.is_serial() || self.silence.has_answering()
+    }
 
-        let result = match response {
-            Response::Exception { function, code } => {
-                *self.statistics.exceptions.entry(code.0).or_default() += 1;
-                Err(LinkError::Exception { unit: exchange.unit, function, code })
+    fn step_connected(&mut self, now: Duration, out: &mut Vec<u8>, wakes: &mut Vec<Waker>) -> Step {
+        if let Some(until) = self.look_after(now, wakes) {
+            return Step::Wait(Some(until));
+        }
+        if std::mem::take(&mut self.hang_up) {
+            return Step::Disconnect;
+        }
+        match self.start_or_wait(now, out, wakes) {
+            Start::Sent(until) => Step::Send(Some(until)),
+            Start::Wait(until) => Step::Wait(until),
+        }
+    }
+
+    /// Starts the exchange whose turn it is, or says when to come again.
+    fn start_or_wait(&mut self, now: Duration, out: &mut Vec<u8>, wakes: &mut Vec<Waker>) -> Start {
+        let free = matches!(self.phase, Phase::Connected) && self.exchange.is_none();
+        if self.closed || self.hang_up || !free {
+            return Start::Wait(None);
+        }
+        let ready = self.client.quiet_until().map_or(self.earliest, |until| until.max(self.earliest));
+        if now < ready {
+            let somebody_waits = self.together.is_some() || !self.queue.is_empty();
+            return Start::Wait(somebody_waits.then_some(ready));
+        }
+        loop {
+            let place = match self.pick(now) {
+                Pick::Job(place) => place,
+                Pick::Wait(until) => return Start::Wait(Some(until)),
+                Pick::Nobody => return Start::Wait(None),
+            };
+            match self.start(now, place, out) {
+                Ok(until) => return Start::Sent(until),
+                Err(error) => self.queue.finish(place, Err(error), wakes),
             }
-            Response::ReadHoldingRegisters(values) | Response::ReadInputRegisters(values) => {
-                if let Some(entry) = self.queue.entry(exchange.place) {
-                    let registers = &mut entry.job.registers;
-                    registers.resize(values.len(), 0);
-                    registers.iter_mut().zip(values.iter()).for_each(|(register, value)| *register = value);
-                }
-                Ok(())
+        }
+    }
+
+    fn pick(&mut self, now: Duration) -> Pick {
+        let Self { queue, units, doubts, line, together, .. } = self;
+        let mut turn = |entry: &Entry| {
+            let job = &entry.job;
+            let (mut until, served) = units
+                .get(job.unit)
+                .map_or_else(Default::default, |unit| (unit.rested(job.spacing), unit.served));
+            if line.is_rtu() {
+                let hold = doubts.hold(now, &job.question(), entry.tries > 0);
+                until = hold.map_or(until, |hold| hold.max(until));
             }
-            _ => Ok(()),
+            match until <= now {
+                true => Turn::Now(served),
+                false => Turn::At(until),
+            }
         };
-        self.queue.finish(exchange.place, result, wakes);
-    }
-
-    fn timed_out(&mut self, now: Duration, wakes: &mut Vec<Waker>) {
-        self.statistics.timeouts += 1;
-        self.earliest = now + self.rules.spacing;
-        if self.exchange.as_ref().is_some_and(|exchange| exchange.sent != Sent::Whole) {
-            // Half a frame is in the connection: nothing may follow it.
-            return self.hang_up(now, Cause::Stuck, wakes);
-        }
-        let Some(exchange) = self.exchange.take() else { return };
-        let Exchange { place, unit, timeout: after, tries, .. } = exchange;
-        let was_silent = tries == 1 && self.silence.is_silent(unit);
-        self.silence.timed_out(unit);
-        let waiting = self.queue.waiting().map(|entry| entry.job.unit);
-        let dead = self.silence.is_dead(self.rules.timeouts_to_drop, waiting);
-        // Who was silent before gets one try while others answer.
-        let again = !was_silent || dead || !self.silence.has_answering();
-        if exchange.write {
-            let loss = Loss::TimedOut { after };
-            self.queue.finish(place, Err(LinkError::Lost { unit, loss }), wakes);
-        } else if !again || !self.retry(&exchange) {
-            self.queue.finish(place, Err(LinkError::Timeout { unit, after, tries }), wakes);
-        }
-        if dead {
-            let requests = self.silence.timeouts();
-            self.hang_up(now, Cause::Silent { requests }, wakes);
-        }
-    }
-
-    /// Ends or requeues the exchange that a drop cut off.
-    fn drop_exchange(&mut self, exchange: &Exchange, cause: Cause, wakes: &mut Vec<Waker>) {
-        let reason = self.outage(cause);
-        let error = match exchange.may_have_left() {
-            true => LinkError::Lost { unit: exchange.unit, loss: Loss::Dropped(reason) },
-            false => LinkError::Down { reason },
+        let Some(place) = *together else {
+            return queue.pick(now, turn);
         };
-        if !self.retry(exchange) {
-            self.queue.finish(exchange.place, Err(error), wakes);
+        match queue.entry(place).map(|entry| turn(entry)) {
+            Some(Turn::At(until)) => Pick::Wait(until),
+            Some(Turn::Now(_)) | None => {
+                *together = None;
+                Pick::Job(place)
+            }
         }
-    }
-
-    /// Puts a read back behind the others of its class if it may be sent once more. The one place where
-    /// anything is sent again, and no write gets past its first line.
-    fn retry(&mut self, exchange: &Exchange) -> bool {
-        if exchange.write || exchange.tries > self.rules.retries {
-            return false;
-        }
-        let Some(entry) = self.queue.entry(exchange.place) else {
-            return false;
-        };
-        entry.probe = entry.job.priority == Priority::Poll && !self.silence.is_answering(exchange.unit);
-        self.queue.put_back(exchange.place);
-        true
     }
 
     /// Whether the connection in use was good for something before it ended. Age alone proves nothing for one that
     /// left requests without an answer.
     fn is_proven(&self, now: Duration) -> bool {
-        let answers = self.statistics.answers - self.answers_before;
+        let answers = self.answers;
         let is_old = now.saturating_sub(self.connected_at) >= PROVEN_AGE;
         answers >= PROVEN_ANSWERS || is_old && (answers > 0 || self.silence.timeouts() == 0)
     }
@@ -517,31 +521,12 @@ pub(crate) enum Phase {
     Down { retry_at: Duration, trying: bool, reason: Outage },
 }
 
-/// The one request that is on the wire.
-#[derive(Debug)]
-struct Exchange {
-    place: Place,
-    unit: u8,
-    write: bool,
-    timeout: Duration,
-    tries: u8,
-    started: Duration,
-    sent: Sent,
-}
-
-impl Exchange {
-    /// Whether it is a write of which the device may know.
-    fn may_have_left(&self) -> bool {
-        self.write && self.sent != Sent::Nothing
-    }
-}
-
-/// How much of a request the system has taken.
-#[derive(Debug, PartialEq, Eq)]
-enum Sent {
-    Nothing,
-    Part,
-    Whole,
+/// What became of an attempt to start an exchange.
+enum Start {
+    /// The frame is to be sent, and looked after then.
+    Sent(Duration),
+    /// Come again then, if anybody waits.
+    Wait(Option<Duration>),
 }
 
 #[derive(Debug)]
@@ -549,7 +534,16 @@ struct Rules {
     spacing: Duration,
     retries: u8,
     timeouts_to_drop: u32,
+    timeout_floor: Duration,
     backoff: Backoff,
+    probes: Backoff,
+}
+
+/// What a poll of a silent unit is told until its next slot.
+fn silent(now: Duration, unit: u8, next_probe: Duration) -> LinkError {
+    let millis = next_probe.saturating_sub(now).as_micros().div_ceil(1000);
+    let next_probe = Duration::from_millis(u64::try_from(millis).unwrap_or(u64::MAX));
+    LinkError::Silent { unit, next_probe }
 }
 
 #[cfg(test)]

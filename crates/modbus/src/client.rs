@@ -50,6 +50,22 @@ pub struct Counters {
     pub garbage_bytes: u64,
 }
 
+/// A whole frame that was taken for no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stray {
+    /// Who sent it.
+    pub unit: u8,
+    /// The function code, without the exception bit.
+    pub function: u8,
+    /// Bytes of its PDU.
+    pub pdu_len: usize,
+    /// Whether it is an exception.
+    pub exception: bool,
+}
+
+/// So many strays are kept for [`Client::take_stray`]; more than that are only counted.
+const MAX_STRAYS: usize = 16;
+
 /// The client's end of one connection or one line.
 ///
 /// One transaction at a time: [`start`](Self::start), then [`receive`](Self::receive) and [`expire`](Self::expire)
@@ -71,6 +87,7 @@ pub struct Client {
     quiet_until: Option<Duration>,
     fault: Option<Fault>,
     counters: Counters,
+    strays: Vec<Stray>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -104,6 +121,7 @@ impl Client {
             quiet_until: None,
             fault: None,
             counters: Counters::default(),
+            strays: Vec::new(),
         }
     }
 
@@ -282,6 +300,12 @@ impl Client {
         self.cutter.reset();
         self.quiet_until = None;
         self.fault = None;
+    }
+
+    /// A frame that was taken for no answer, the latest first, and each once. A scheduler sees by them whose late answer
+    /// has come.
+    pub fn take_stray(&mut self) -> Option<Stray> {
+        self.strays.pop()
     }
 
     /// What came and was not taken for an answer.

@@ -41,7 +41,7 @@ pub mod rtu;
 pub mod server;
 pub mod stream;
 
-pub use client::{Client, Counters, Progress};
+pub use client::{Client, Counters, Progress, Stray};
 pub use error::{DecodeError, EncodeError, Fault, FrameError, Mismatch, StartError};
 pub use pdu::{Bits, ExceptionCode, MAX_PDU, Registers, Request, Response};
 pub use server::{Incoming, Server};

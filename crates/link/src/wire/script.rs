@@ -25,9 +25,14 @@ impl Script {
         Self::with(Options::default())
     }
 
+    /// A wire whose time-outs are always the same, unless the options say otherwise.
     pub(super) fn with(options: Options) -> Self {
+        Self::on(Line::tcp(), Options { timeout_floor: ms(TIMEOUT), ..options })
+    }
+
+    pub(super) fn on(line: Line, options: Options) -> Self {
         Self {
-            wire: Wire::new(endpoint(), Framing::Tcp, &options),
+            wire: Wire::new(endpoint(), line, &options),
             out: Vec::new(),
             wakes: Vec::new(),
             woken: Arc::default(),
@@ -66,10 +71,7 @@ impl Script {
         priority: Priority,
         ask: Ask,
     ) -> Result<Ticket, LinkError> {
-        self.submit_job(
-            at,
-            Job { unit, ask, priority, timeout: ms(TIMEOUT), short: false, registers: Vec::new() },
-        )
+        self.submit_job(at, Job { ask, priority, ..job(unit) })
     }
 
     pub(super) fn submit_job(&mut self, at: u64, job: Job) -> Result<Ticket, LinkError> {
@@ -106,7 +108,7 @@ impl Script {
     }
 
     pub(super) fn statistics(&self) -> Statistics {
-        self.wire.statistics()
+        self.wire.statistics(Duration::ZERO)
     }
 }
 
@@ -120,6 +122,19 @@ pub(super) fn down(cause: Cause) -> LinkError {
 
 pub(super) fn lost(cause: Cause) -> LinkError {
     LinkError::Lost { unit: 1, loss: Loss::Dropped(Outage { endpoint: endpoint(), cause }) }
+}
+
+/// A read that a person waits for.
+pub(super) fn job(unit: u8) -> Job {
+    Job {
+        unit,
+        ask: read(ADDRESS),
+        priority: Priority::Person,
+        timeout: ms(TIMEOUT),
+        spacing: Duration::ZERO,
+        short: false,
+        registers: Vec::new(),
+    }
 }
 
 pub(super) fn read(address: u16) -> Ask {

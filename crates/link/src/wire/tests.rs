@@ -316,14 +316,7 @@ fn a_connection_that_never_answers_is_not_good_because_it_is_old() {
 #[test]
 fn our_own_pause_costs_no_request_its_time() {
     let mut script = Script::connected();
-    let job = Job {
-        unit: 1,
-        ask: read(1),
-        priority: Priority::Person,
-        timeout: ms(50),
-        short: false,
-        registers: Vec::new(),
-    };
+    let job = Job { timeout: ms(50), ..job(1) };
     let ticket = script.submit_job(0, job).unwrap();
     script.step(0);
     script.loses(10, Cause::Reset);
@@ -497,14 +490,7 @@ fn takes_for_ever_as_a_day() {
         backoff: Backoff { first: Duration::MAX, max: Duration::MAX },
         ..Options::default()
     });
-    let endless = Job {
-        unit: 1,
-        ask: read(1),
-        priority: Priority::Poll,
-        timeout: Duration::MAX,
-        short: false,
-        registers: Vec::new(),
-    };
+    let endless = Job { priority: Priority::Poll, timeout: Duration::MAX, spacing: Duration::MAX, ..job(1) };
     script.wire.submit(ms(0), endless, Waker::noop()).unwrap();
     assert_eq!(script.step(0), Step::Connect);
     assert_eq!(script.step(0), Step::Wait(Some(day)));
@@ -544,14 +530,7 @@ fn ends_everything_when_closed() {
 #[test]
 fn takes_a_short_answer_only_for_who_allows_it() {
     let mut script = Script::connected();
-    let job = |short| Job {
-        unit: 1,
-        ask: read(1),
-        priority: Priority::Person,
-        timeout: ms(TIMEOUT),
-        short,
-        registers: Vec::new(),
-    };
+    let job = |short| Job { short, ..job(1) };
     for (transaction, short, registers) in
         [(1, true, Some(vec![7])), (2, false, None), (3, true, Some(vec![7]))]
     {

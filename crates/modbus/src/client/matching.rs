@@ -1,9 +1,9 @@
 //! Which frame is the answer: the part of the client that looks at bytes.
 
-use super::{Client, Counters, State};
+use super::{Client, Counters, MAX_STRAYS, State, Stray};
 use crate::error::{Fault, Mismatch};
 use crate::mbap::{self, Front};
-use crate::pdu::Response;
+use crate::pdu::{EXCEPTION_BIT, Response};
 use crate::stream::guess_response;
 
 /// What one frame is to a client.
@@ -40,6 +40,23 @@ impl Verdict {
             Err(Mismatch::Function { .. }) => Self::WrongFunction,
             Err(Mismatch::Length { .. }) => Self::WrongLength,
             Err(Mismatch::Echo { .. }) => Self::WrongEcho,
+        }
+    }
+
+    /// Counts a frame that is no answer, and keeps whose it was.
+    fn note(self, unit: u8, pdu: &[u8], counters: &mut Counters, strays: &mut Vec<Stray>) {
+        if self == Self::Answer {
+            return;
+        }
+        self.count(counters);
+        let function = pdu.first().copied().unwrap_or_default();
+        if strays.len() < MAX_STRAYS {
+            strays.push(Stray {
+                unit,
+                function: function & !EXCEPTION_BIT,
+                pdu_len: pdu.len(),
+                exception: function & EXCEPTION_BIT != 0,
+            });
         }
     }
 
@@ -90,7 +107,7 @@ impl Client {
                     let transaction = Some(header.transaction);
                     let verdict = Verdict::of(&self.state, transaction, header.unit, pdu);
                     answered |= settle(verdict, pdu, &mut self.state, &mut self.answer);
-                    verdict.count(&mut self.counters);
+                    verdict.note(header.unit, pdu, &mut self.counters, &mut self.strays);
                     used += len;
                 }
                 Front::Foreign { len } => {
@@ -117,7 +134,7 @@ impl Client {
             let frame = self.cutter.frame(&frame);
             let verdict = Verdict::of(&self.state, None, frame.unit, frame.pdu);
             answered |= settle(verdict, frame.pdu, &mut self.state, &mut self.answer);
-            verdict.count(&mut self.counters);
+            verdict.note(frame.unit, frame.pdu, &mut self.counters, &mut self.strays);
         }
     }
 
