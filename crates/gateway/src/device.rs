@@ -38,6 +38,11 @@ pub(crate) struct Round {
 }
 
 impl Round {
+    /// When the wire lets a poll through again, where it held the last one back.
+    pub(crate) fn held(&self) -> Option<Duration> {
+        self.failures.last().and_then(|(_, failure)| failure.next_probe())
+    }
+
     /// Whether the device answered anything at all, if only to refuse.
     pub(crate) fn reached_the_device(&self) -> bool {
         !self.answers.is_empty() || self.failures.iter().any(|(_, failure)| failure.device_answered())

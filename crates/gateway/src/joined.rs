@@ -137,10 +137,7 @@ mod tests {
     fn a_joined_signal_says_what_it_is_made_of() {
         let points = points_view(busbar_profile::builtin("smartgen-acc1700").unwrap());
         let hours = points.joined.iter().find(|joined| joined.signal == "engine.hours").unwrap();
-        assert_eq!(
-            hours.points,
-            ["total_running_hours", "total_running_minutes", "total_running_seconds"]
-        );
+        assert_eq!(hours.points, ["total_running_hours", "total_running_minutes", "total_running_seconds"]);
         assert!(hours.meaning.contains("ours") && hours.unit.as_deref() == Some("h"), "{hours:?}");
     }
 }

@@ -5,12 +5,15 @@ mod plan;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use busbar_link::{Endpoint, Latency, Link, OpenError, Options, Priority, Statistics, WireState};
+use busbar_link::{
+    Endpoint, Latency, Link, OpenError, Options, Priority, Statistics, UnitState, UnitStatistics, WireState,
+};
 use busbar_profile::Profile;
 use busbar_profile::plan::Cost;
 
 use crate::api::types::{
-    self, ExceptionCount, LatencyBucket, LatencyView, WireDetailView, WireStatistics, WireTime, WireView,
+    self, ExceptionCount, LatencyBucket, LatencyView, UnitView, WireDetailView, WireStatistics, WireTime,
+    WireView,
 };
 use crate::poll_plan::Overview;
 use crate::site::{Site, SiteDevice, SiteWire};
@@ -28,7 +31,7 @@ fn options(wire: &SiteWire, profiles: &[&Profile]) -> Options {
     let defaults = Options::default();
     Options {
         timeout: wire.timeout.or(longest.map(ms)).unwrap_or(defaults.timeout),
-        // The pauses of a device are for the others on the wire to use: its poller keeps them.
+        // The pauses of a device are for the others on the wire to use: they are kept by unit.
         spacing: wire.spacing.unwrap_or(defaults.spacing),
         // Every device has one read waiting at most.
         queue: defaults.queue.max(profiles.len() + 16),
@@ -95,6 +98,8 @@ fn statistics(counted: &Statistics) -> WireStatistics {
         wrong_protocol: counted.wrong_protocol,
         crc_errors: counted.crc_errors,
         garbage: counted.garbage_bytes,
+        echoes: counted.echoes,
+        held: counted.held,
         reconnects: counted.reconnects,
         bytes_in: counted.bytes_received,
         bytes_out: counted.bytes_sent,
@@ -108,10 +113,70 @@ pub(crate) fn detail(id: &str, link: &Link, devices: &[(SiteDevice, Overview)]) 
     WireDetailView {
         wire: view(id, link),
         latency: latency(&counted.latency),
-        time: WireTime::default(),
-        units: Vec::new(),
+        open_s: rounded(counted.open_for.as_secs_f64()),
+        time: time(link.endpoint(), counted.open_for, counted.busy, counted.waiting),
+        units: counted
+            .units
+            .iter()
+            .map(|unit| self::unit(link.endpoint(), &counted, unit, devices))
+            .collect(),
         plans: devices.iter().map(|(device, plan)| plan::view(link.endpoint(), device, plan)).collect(),
     }
+}
+
+fn unit(
+    endpoint: &Endpoint,
+    wire: &Statistics,
+    counted: &UnitStatistics,
+    devices: &[(SiteDevice, Overview)],
+) -> UnitView {
+    let device = devices.iter().find(|(device, _)| device.unit == counted.unit);
+    let (state, next_probe) = match counted.state {
+        UnitState::Answering => (types::UnitState::Answering, None),
+        UnitState::Missing => (types::UnitState::Missing, None),
+        UnitState::Silent { next_probe } => (types::UnitState::Silent, Some(next_probe)),
+        _ => (types::UnitState::Unknown, None),
+    };
+    UnitView {
+        unit: counted.unit,
+        device: device.map(|(device, _)| device.id.clone()),
+        state,
+        next_probe_s: next_probe.map(|next_probe| next_probe.as_secs_f64()),
+        requests: counted.requests,
+        answers: counted.answers,
+        timeouts: counted.timeouts,
+        retries: counted.retries,
+        held: counted.held,
+        exceptions: exceptions(&counted.exceptions),
+        late: counted.late,
+        crc_errors: counted.crc_errors,
+        garbage: counted.garbage_bytes,
+        bytes_in: counted.bytes_received,
+        bytes_out: counted.bytes_sent,
+        latency: latency(&counted.latency),
+        time: time(endpoint, wire.open_for, counted.busy, counted.waiting),
+    }
+}
+
+/// How much of the time that a wire has been open was used, and how.
+fn time(endpoint: &Endpoint, open_for: Duration, busy: Duration, waiting: Duration) -> WireTime {
+    let share = |part: Duration| match open_for.as_secs_f64() {
+        open if open > 0.0 => rounded(part.as_secs_f64() / open).min(1.0),
+        _ => 0.0,
+    };
+    // Only of a line of our own is the speed known.
+    let busy = matches!(endpoint, Endpoint::Rtu { .. }).then_some(busy);
+    WireTime {
+        busy_s: busy.map(|busy| rounded(busy.as_secs_f64())),
+        waiting_s: rounded(waiting.as_secs_f64()),
+        busy_share: busy.map(share),
+        waiting_share: share(waiting),
+    }
+}
+
+/// To four decimals.
+fn rounded(number: f64) -> f64 {
+    (number * 10_000.0).round() / 10_000.0
 }
 
 fn latency(counted: &Latency) -> LatencyView {
@@ -161,6 +226,18 @@ mod tests {
         let slow = SiteWire { spacing: Some(ms(20)), timeout: Some(ms(300)), ..wire() };
         let set = options(&slow, &[hat]);
         assert_eq!((set.spacing, set.timeout), (ms(20), ms(300)));
+    }
+
+    #[test]
+    fn the_time_of_a_line_is_shared_out_and_that_of_tcp_is_not_claimed() {
+        let line: Endpoint = "rtu:///dev/a".parse().unwrap();
+        let used = time(&line, ms(10_000), ms(2_500), ms(400));
+        assert_eq!((used.busy_s, used.busy_share), (Some(2.5), Some(0.25)));
+        assert_eq!((used.waiting_s, used.waiting_share), (0.4, 0.04));
+        let tcp = time(&wire().endpoint, ms(10_000), Duration::ZERO, ms(400));
+        assert_eq!((tcp.busy_s, tcp.busy_share, tcp.waiting_share), (None, None, 0.04));
+        let fresh = time(&line, Duration::ZERO, Duration::ZERO, Duration::ZERO);
+        assert_eq!((fresh.busy_share, fresh.waiting_share), (Some(0.0), 0.0));
     }
 
     #[test]

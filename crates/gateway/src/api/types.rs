@@ -14,7 +14,7 @@ use utoipa::openapi::{RefOr, schema};
 use utoipa::{PartialSchema, ToSchema};
 
 pub use self::wire::{
-    ExceptionCount, LatencyBucket, LatencyView, PlanView, PlannedRead, PlannedRound, UnitView,
+    ExceptionCount, LatencyBucket, LatencyView, PlanView, PlannedRead, PlannedRound, UnitState, UnitView,
     WireDetailView, WireState, WireStatistics, WireTime, WireView,
 };
 

@@ -118,7 +118,18 @@ async fn a_wire_is_told_in_detail() {
     let latency = &detail["latency"];
     let buckets = latency["buckets"].as_array().unwrap();
     let counted: u64 = buckets.iter().map(|bucket| bucket["count"].as_u64().unwrap()).sum();
-    assert_eq!((latency["count"].as_u64(), &buckets.last().unwrap()["up_to_ms"]), (Some(counted), &json!(null)));
+    assert_eq!(
+        (latency["count"].as_u64(), &buckets.last().unwrap()["up_to_ms"]),
+        (Some(counted), &json!(null))
+    );
+
+    let unit = &detail["units"][0];
+    assert_eq!(
+        (&unit["unit"], &unit["device"], &unit["state"], &unit["next_probe_s"]),
+        (&json!(1), &json!("gen1"), &json!("answering"), &json!(null))
+    );
+    assert_eq!((unit["answers"].as_u64(), &unit["time"]["busy_s"]), (Some(counted), &json!(null)));
+    assert!(detail["open_s"].as_f64().unwrap() > 0.0, "{detail}");
 
     let plan = &detail["plans"][0];
     assert_eq!((&plan["device"], &plan["unit"], &plan["refused"]), (&json!("gen1"), &json!(1), &json!([])));

@@ -67,8 +67,12 @@ pub struct WireStatistics {
     pub wrong_protocol: u64,
     /// Frames whose checksum was wrong.
     pub crc_errors: u64,
-    /// Bytes that belonged to no frame.
+    /// Bytes that belonged to no frame: noise.
     pub garbage: u64,
+    /// Own requests that a converter sent back.
+    pub echoes: u64,
+    /// Polls of silent units that were held back, so that the others keep their pace.
+    pub held: u64,
     /// Times the wire was connected again.
     pub reconnects: u64,
     /// Bytes received.
@@ -97,7 +101,10 @@ pub struct WireDetailView {
     pub wire: WireView,
     /// How long answers took, all units together.
     pub latency: LatencyView,
-    /// How its time was used.
+    /// Seconds since it was opened.
+    #[schema(examples(3600.0))]
+    pub open_s: f64,
+    /// How its time was used, all units together.
     pub time: WireTime,
     /// The units that were asked, by unit id.
     pub units: Vec<UnitView>,
@@ -133,22 +140,19 @@ pub struct LatencyBucket {
     pub count: u64,
 }
 
-/// How the time of a wire was used.
+/// How much of a wire's time was used, and how.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ToSchema)]
 pub struct WireTime {
-    /// Seconds since the wire was opened.
-    #[schema(examples(3600.0))]
-    pub open_s: f64,
     /// Seconds in which characters were on the line; null where its speed is not known, as over TCP.
     #[schema(required, examples(812.4))]
     pub busy_s: Option<f64>,
     /// Seconds in which an answer was waited for.
     #[schema(examples(96.1))]
     pub waiting_s: f64,
-    /// Share of the time in which characters were on the line, 0 to 1.
+    /// Share of the time since the wire was opened in which characters were on the line, 0 to 1.
     #[schema(required, examples(0.23))]
     pub busy_share: Option<f64>,
-    /// Share of the time in which an answer was waited for, 0 to 1.
+    /// Share of the time since the wire was opened in which an answer was waited for, 0 to 1.
     #[schema(examples(0.03))]
     pub waiting_share: f64,
 }
@@ -162,8 +166,11 @@ pub struct UnitView {
     /// Id of the device; null for a unit that is none of the site.
     #[schema(required, examples("gen1"))]
     pub device: Option<String>,
-    /// Whether it did not answer when it was asked last; it is then asked rarely, so that the others keep their pace.
-    pub silent: bool,
+    /// What it did when it was asked last.
+    pub state: UnitState,
+    /// Seconds until a silent unit is polled again; null for the others.
+    #[schema(required, examples(12.5))]
+    pub next_probe_s: Option<f64>,
     /// Requests sent, repeats included.
     pub requests: u64,
     /// Answers taken, exceptions included.
@@ -172,18 +179,38 @@ pub struct UnitView {
     pub timeouts: u64,
     /// Reads that were sent once more.
     pub retries: u64,
+    /// Polls that were held back while it was silent, so that the others keep their pace.
+    pub held: u64,
     /// Exceptions, by code.
     pub exceptions: Vec<ExceptionCount>,
     /// Answers that came after their time was up.
     pub late: u64,
-    /// Frames whose checksum was wrong, while its answer was waited for.
+    /// Frames whose checksum was wrong, while its answer was due.
     pub crc_errors: u64,
+    /// Bytes that belonged to no frame, while its answer was due.
+    pub garbage: u64,
     /// Bytes received.
     pub bytes_in: u64,
     /// Bytes sent.
     pub bytes_out: u64,
     /// How long its answers took.
     pub latency: LatencyView,
+    /// How much of the wire's time went to it.
+    pub time: WireTime,
+}
+
+/// What a unit did when it was asked last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum UnitState {
+    /// It was not asked yet, or its first answer is still due.
+    Unknown,
+    /// It answered.
+    Answering,
+    /// It did not answer.
+    Missing,
+    /// It has not answered for several times, and is polled only now and then.
+    Silent,
 }
 
 /// What one device is polled with.
