@@ -374,3 +374,14 @@ fn what_deserves_a_look_is_no_mistake() {
     let found = mistakes(&dkg(251));
     assert_eq!(found, ["site.toml:9:8: datakom-dkg705 knows no unit 251; write a number from 1 to 250"]);
 }
+
+#[test]
+fn the_sample_is_sound() {
+    let sample = include_str!("../../../../examples/site.toml");
+    let site = Site::parse("examples/site.toml", sample).unwrap_or_else(|findings| panic!("{findings}"));
+    assert!(site.warnings.is_empty(), "{:?}", site.warnings);
+    let on_the_line = site.devices.iter().filter(|device| site.wires[device.wire].id == "line");
+    assert_eq!((on_the_line.count(), site.devices.len()), (3, 4));
+    let schemes: Vec<&str> = site.wires.iter().map(|wire| wire.endpoint.scheme()).collect();
+    assert_eq!(schemes, ["tcp", "rtu"]);
+}
