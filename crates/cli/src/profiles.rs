@@ -106,7 +106,9 @@ pub(crate) fn read(path: &Path, what: &str) -> Result<String, Failure> {
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let line = 1 + error.as_bytes().iter().take(valid).filter(|byte| **byte == b'\n').count();
-        Failure::Failed(format!("{what} {file} is not UTF-8 text from line {line} on; save it as UTF-8"))
+        Failure::Failed(format!(
+            "{what} {file} is not UTF-8 text: line {line} has other bytes; save it as UTF-8"
+        ))
     })
 }
 
