@@ -1,8 +1,10 @@
+import { readFileSync } from 'node:fs'
+import { resolve } from 'node:path'
 import { describe, expect, test } from 'vitest'
 import { lampsOf } from './lamps'
 import { deviceLink, parseRoute, wireLink } from './route'
 import { group, joined, point, value } from './samples'
-import { flagText, tilesOf } from './vitals'
+import { flagText, TILES, tilesOf } from './vitals'
 
 describe('the address', () => {
   test.each(['gen1', 'ATS north/2', 'ö%'])('of device %s leads back to it', (id) => {
@@ -94,5 +96,31 @@ describe('the values at a glance', () => {
       'Engine speed',
       'Engine hours',
     ])
+  })
+
+  const PROFILES = resolve(process.cwd(), '../profiles')
+
+  test('have signals that the vocabulary knows', () => {
+    const vocabulary = readFileSync(`${PROFILES}/vocabulary.toml`, 'utf8')
+    for (const signal of TILES.flatMap(({ signals }) => signals))
+      expect(vocabulary).toContain(`id = "${signal}"`)
+  })
+
+  test.each([
+    ['datakom-d', ['Mains voltage', 'Genset power', 'Genset breaker', 'Engine hours', 'Fuel']],
+    ['datakom-dkg705', ['Mains voltage', 'Genset power', 'Genset breaker', 'Engine speed', 'Engine hours']],
+    [
+      'smartgen-hat821si',
+      ['Source 1', 'Source 1 switch', 'Source 2 voltage', 'Bus tie', 'Source 2 supplied'],
+    ],
+    [
+      'smartgen-acc1700',
+      ['Compressor', 'Discharge pressure', 'Engine hours', 'Next service', 'Oil pressure'],
+    ],
+  ])('of %s are there', (profile, titles) => {
+    const text = readFileSync(`${PROFILES}/${profile}/profile.toml`, 'utf8')
+    const carried = new Set([...text.matchAll(/signal = "([^"]+)"/g)].map(([, signal]) => signal))
+    const shown = TILES.filter(({ signals }) => signals.some((signal) => carried.has(signal)))
+    expect(shown.map(({ title }) => title)).toEqual(expect.arrayContaining(titles))
   })
 })

@@ -12,7 +12,7 @@ interface Wanted {
 const SWITCH = ['open', 'closed'] as const
 
 /** In the order of the page. */
-const TILES: readonly Wanted[] = [
+export const TILES: readonly Wanted[] = [
   { title: 'Mains voltage', signals: ['mains.voltage.average', 'mains.l1.voltage'] },
   { title: 'Mains frequency', signals: ['mains.frequency'] },
   { title: 'Mains breaker', signals: ['breaker.mains.closed'], words: SWITCH },
