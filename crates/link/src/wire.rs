@@ -551,6 +551,8 @@ fn silent(now: Duration, unit: u8, next_probe: Duration) -> LinkError {
 }
 
 #[cfg(test)]
+mod lateness;
+#[cfg(test)]
 mod pace;
 #[cfg(test)]
 mod promises;
@@ -558,6 +560,8 @@ mod promises;
 mod rtu;
 #[cfg(test)]
 mod script;
+#[cfg(test)]
+mod sim;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
