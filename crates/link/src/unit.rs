@@ -43,9 +43,9 @@ impl Units {
         self.0.iter_mut()
     }
 
-    /// How long the slowest unit would be waited for; none where nothing was measured.
+    /// How long a probe of the slowest unit would wait; none where nothing was measured.
     pub(crate) fn slowest(&self, floor: Duration, limit: Duration) -> Option<Duration> {
-        self.0.iter().filter_map(|unit| unit.timing.estimate(floor, limit)).max()
+        self.0.iter().filter_map(|unit| unit.timing.probe(floor, limit)).max()
     }
 
     fn find(&self, id: u8) -> Result<usize, usize> {
@@ -229,7 +229,7 @@ mod tests {
         assert!(unit.is_silent());
         unit.answered_late(ms(600));
         assert!(!unit.is_silent());
-        assert_eq!(unit.timing.estimate(ms(200), ms(5000)), Some(ms(1800)), "and slow");
+        assert_eq!(unit.timing.timeout(ms(200), ms(5000)), ms(1800), "and slow");
         unit.missed(ms(700));
         assert!(unit.is_silent(), "it has not answered in time");
         unit.answered(None);

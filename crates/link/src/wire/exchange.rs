@@ -92,7 +92,7 @@ impl Wire {
             None => limit,
             // A probe is no reason to make the others wait long. Who turns out to be slower is heard late.
             Some(unit) if has_slots && unit.is_silent() => {
-                let own = unit.timing.estimate(floor, limit);
+                let own = unit.timing.probe(floor, limit);
                 own.or_else(|| self.units.slowest(floor, limit)).unwrap_or(limit)
             }
             Some(unit) => unit.timing.timeout(floor, limit),
