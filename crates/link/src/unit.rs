@@ -72,8 +72,8 @@ pub(crate) struct Unit {
     /// When that ended, and the pause that was wanted after it.
     ended: Duration,
     spacing: Duration,
-    /// When the first request left that has had no answer yet.
-    unanswered_since: Option<Duration>,
+    /// When the last request left that has had no answer.
+    unanswered: Option<Duration>,
     pub(crate) counts: Counts,
 }
 
@@ -107,7 +107,7 @@ impl Unit {
             served: 0,
             ended: Duration::ZERO,
             spacing: Duration::ZERO,
-            unanswered_since: None,
+            unanswered: None,
             counts: Counts::default(),
         }
     }
@@ -137,7 +137,7 @@ impl Unit {
         self.missed = 0;
         self.probes = 0;
         self.next_probe = Duration::ZERO;
-        self.unanswered_since = None;
+        self.unanswered = None;
         if let Some(latency) = latency {
             self.timing.measure(latency);
         }
@@ -148,7 +148,7 @@ impl Unit {
         self.counts.timeouts += 1;
         self.missed = self.missed.saturating_add(1);
         self.timing.miss();
-        self.unanswered_since.get_or_insert(started);
+        self.unanswered = Some(started);
     }
 
     /// It answered after all, too late: it is alive, and slower than was thought.
@@ -157,7 +157,7 @@ impl Unit {
         self.missed = self.missed.min(SILENT_AFTER - 1);
         self.probes = 0;
         self.next_probe = Duration::ZERO;
-        if let Some(since) = self.unanswered_since.take() {
+        if let Some(since) = self.unanswered.take() {
             self.timing.measure(now.saturating_sub(since));
         }
     }
