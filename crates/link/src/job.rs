@@ -141,7 +141,7 @@ impl Question {
 }
 
 /// The request itself.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum Ask {
     Holding {
         address: u16,

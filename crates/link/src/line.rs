@@ -67,19 +67,22 @@ impl Line {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::endpoint::{Parity, StopBits};
+    use crate::endpoint::Endpoint;
 
     #[test]
     fn characters_take_their_bits() {
-        for (baud, parity, stop, character, silence) in [
-            (9_600, Parity::None, StopBits::One, 1_041_667, 3_645_834),
-            (9_600, Parity::Even, StopBits::One, 1_145_834, 4_010_417),
-            (2_400, Parity::None, StopBits::Two, 4_583_334, 16_041_667),
-            (38_400, Parity::None, StopBits::One, 260_417, 1_750_000),
+        for (settings, character, silence) in [
+            ("baud=9600&parity=none&stop=1", 1_041_667, 3_645_834),
+            ("baud=9600&parity=even&stop=1", 1_145_834, 4_010_417),
+            ("baud=2400&parity=none&stop=2", 4_583_334, 16_041_667),
+            ("baud=38400&parity=none&stop=1", 260_417, 1_750_000),
         ] {
-            let line = Line::rtu(&Serial { baud, parity, stop, ..Serial::default() });
-            assert_eq!(line.character, Duration::from_nanos(character), "{baud}");
-            assert_eq!(line.silence, Duration::from_nanos(silence), "{baud}");
+            let Ok(Endpoint::Rtu { serial, .. }) = format!("rtu:///dev/ttyS0?{settings}").parse() else {
+                panic!("{settings}");
+            };
+            let line = Line::rtu(&serial);
+            assert_eq!(line.character, Duration::from_nanos(character), "{settings}");
+            assert_eq!(line.silence, Duration::from_nanos(silence), "{settings}");
             assert!(line.is_serial() && line.is_rtu());
         }
         // A read of 16 registers and its answer.

@@ -25,7 +25,7 @@ pub struct Options {
     /// Most requests that may wait in each class of priority.
     pub queue: usize,
     /// After so many time-outs in a row the connection is taken for dead and made anew, unless a unit that may still
-    /// answer was not asked among them. A serial line is no connection, and is never taken for dead.
+    /// answer was not asked among them, and not before as many whole time-outs have passed. A serial line is no connection, and is never taken for dead.
     pub timeouts_to_drop: u32,
     /// How long to wait before a connection that failed is tried again, or one that dropped before it had proved good.
     pub backoff: Backoff,

@@ -12,7 +12,7 @@ use crate::job::{Priority, Question};
 use crate::line::Line;
 use crate::queue::Place;
 
-/// So many times the time-out after it was given up, a request on RTU may still be answered.
+/// For so many times the longest time-out after that is over, a request on RTU may still be answered.
 const HORIZON: u32 = 2;
 
 /// An answer has at least so many bytes on RTU. Fewer that make no sense are noise, and the answer may still come.
@@ -38,6 +38,7 @@ pub(super) struct Exchange {
     limit: Duration,
     spacing: Duration,
     started: Duration,
+    deadline: Duration,
     /// When silence will have ended what has come so far, if that does not look like the answer.
     silence: Option<Duration>,
 }
@@ -45,6 +46,12 @@ pub(super) struct Exchange {
 impl Exchange {
     pub(super) fn unit(&self) -> u8 {
         self.question.unit
+    }
+
+    /// Until when its answer may come.
+    fn horizon(&self) -> Duration {
+        let given_up = self.deadline + (self.limit - self.timeout);
+        given_up + self.limit.saturating_mul(HORIZON)
     }
 
     /// Whether it is a write of which the device may know.
@@ -85,7 +92,7 @@ impl Wire {
             None => limit,
             // A probe is no reason to make the others wait long. Who turns out to be slower is heard late.
             Some(unit) if has_slots && unit.is_silent() => {
-                let own = unit.timing.estimate(floor, limit);
+                let own = unit.timing.probe(floor, limit);
                 own.or_else(|| self.units.slowest(floor, limit)).unwrap_or(limit)
             }
             Some(unit) => unit.timing.timeout(floor, limit),
@@ -115,6 +122,7 @@ impl Wire {
             limit,
             spacing: job.spacing,
             started: now,
+            deadline: now + patience,
             silence: None,
         });
         Ok(now + patience)
@@ -171,7 +179,7 @@ impl Wire {
             unit.answered_late(now);
         }
         if self.line.is_rtu() {
-            self.doubts.seen(stray);
+            self.doubts.seen(now, stray);
             // Who sends what nobody asked for may send more of it.
             self.earliest = self.earliest.max(now + DEFAULT_QUIET);
         }
@@ -216,6 +224,7 @@ impl Wire {
 
         self.answers += 1;
         self.silence.answered(exchange.unit());
+        self.unanswered_since = None;
         let unit = self.units.record(exchange.unit());
         unit.answered(is_certain.then_some(reaction));
         unit.counts.answers += 1;
@@ -236,8 +245,7 @@ impl Wire {
             self.fulfil(&exchange, wakes);
         }
         if self.line.is_rtu() && !is_exception {
-            let until = horizon(now, &exchange);
-            self.doubts.answered(now, &exchange.question, until);
+            self.doubts.answered(now, &exchange.question, exchange.horizon());
         }
     }
 
@@ -278,7 +286,10 @@ impl Wire {
         self.units.record(unit).missed(exchange.started);
         let waiting = self.queue.waiting().map(|entry| entry.job.unit);
         let is_dead = self.silence.is_dead(self.rules.timeouts_to_drop, waiting);
-        let dead = is_dead && !self.line.is_serial();
+        // Short time-outs come fast one after the other, and a connection may stall for longer than that.
+        let since = *self.unanswered_since.get_or_insert(exchange.started);
+        let is_long = now.saturating_sub(since) >= exchange.limit.saturating_mul(self.rules.timeouts_to_drop);
+        let dead = is_dead && is_long && !self.line.is_serial();
         // Who was silent before gets one try while others answer.
         let again = !was_silent || dead || !self.has_slots();
         if exchange.question.write {
@@ -315,7 +326,7 @@ impl Wire {
 
     /// The answer may still come, and must not be taken for another.
     fn doubt(&mut self, now: Duration, exchange: &Exchange) {
-        self.doubts.lost(now, exchange.question, horizon(now, exchange));
+        self.doubts.lost(now, exchange.question, exchange.horizon());
     }
 
     /// Ends or requeues the exchange that a drop cut off.
@@ -360,10 +371,4 @@ impl Wire {
 fn time_on_line(line: &Line, question: &Question) -> Duration {
     let pdus = [question.request_pdu(), question.answer_pdu()];
     line.time(pdus.into_iter().map(|pdu| line.frame(pdu)).sum())
-}
-
-/// Until when the answer to an exchange may come.
-fn horizon(now: Duration, exchange: &Exchange) -> Duration {
-    let deadline = now.max(exchange.started + exchange.timeout);
-    deadline + exchange.limit.saturating_mul(HORIZON)
 }

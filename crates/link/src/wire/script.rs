@@ -4,6 +4,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::task::Wake;
 
 use super::*;
+use crate::endpoint::Serial;
+use crate::error::Outage;
 use crate::job::{Ask, Write};
 
 pub(super) const TIMEOUT: u64 = 1000;
@@ -50,8 +52,27 @@ impl Script {
         self.wire.connected(ms(at));
     }
 
+    /// A serial line of 9600 baud, 8N1: 1.041667 ms a character, 3.645834 ms of silence.
+    pub(super) fn serial() -> Self {
+        let mut script = Self::on(Line::rtu(&Serial::default()), Options::default());
+        script.connect(0);
+        script
+    }
+
     pub(super) fn step(&mut self, at: u64) -> Step {
-        self.wire.step(ms(at), &mut self.out, &mut self.wakes)
+        self.step_at(ms(at))
+    }
+
+    pub(super) fn step_at(&mut self, at: Duration) -> Step {
+        self.wire.step(at, &mut self.out, &mut self.wakes)
+    }
+
+    /// Steps, and expects a frame to leave; gives back unit and address, and how long its answer is waited for.
+    pub(super) fn asks(&mut self, at: u64) -> (u8, u16, Duration) {
+        let Step::Send(Some(until)) = self.step(at) else { panic!("nothing leaves at {at} ms") };
+        let front = if self.wire.line.is_rtu() { 0 } else { 6 };
+        let address = u16::from_be_bytes([self.out[front + 2], self.out[front + 3]]);
+        (self.out[front], address, until - ms(at))
     }
 
     /// Steps, and expects a frame to leave.
@@ -149,6 +170,25 @@ pub(super) fn frame(transaction: u16, pdu: &[u8]) -> Vec<u8> {
     let [high, low] = transaction.to_be_bytes();
     let length = u8::try_from(pdu.len() + 1).unwrap();
     [&[high, low, 0, 0, 0, length, 1], pdu].concat()
+}
+
+/// The answer of a unit on RTU.
+pub(super) fn rtu_frame(unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let body = [&[unit], pdu].concat();
+    [&body[..], &busbar_modbus::rtu::crc16(&body).to_le_bytes()].concat()
+}
+
+/// The answer of a unit to `read` on RTU.
+pub(super) fn rtu_answer(unit: u8, first: u16) -> Vec<u8> {
+    let [high, low] = first.to_be_bytes();
+    rtu_frame(unit, &[0x03, 4, high, low, 0, 0])
+}
+
+/// The answer of a unit to `read`.
+pub(super) fn answer_of(unit: u8, transaction: u16) -> Vec<u8> {
+    let mut answer = answer(transaction);
+    answer[6] = unit;
+    answer
 }
 
 /// The answer to `read`.
