@@ -107,6 +107,25 @@ describe.each([
   })
 })
 
+test.each([
+  ['desk', DESK, 'light'],
+  ['phone', PHONE, 'dark'],
+] as const)('on a %s the wires tell what goes over them', async (name, viewport, scheme) => {
+  const page = await open(viewport, scheme)
+  await page.getByRole('link', { name: 'Wires' }).click()
+  await page.getByRole('heading', { name: /^Wire / }).waitFor()
+  await page.getByText('Connected').first().waitFor()
+  const requests = () => page.locator('dl dd').first().textContent()
+  const before = await requests()
+  await expect.poll(requests, { timeout: 10_000 }).not.toBe(before)
+  await page.getByText('Every read').first().click()
+  expect(await page.getByRole('table').count()).toBeGreaterThan(2)
+  expect(await overflow(page)).toBe(0)
+  await page.screenshot({ path: `${SHOTS}wires-${name}-${scheme}.png`, fullPage: true })
+  expect(complaints).toEqual([])
+  await page.close()
+})
+
 test('what the page shows is what the API says', async () => {
   const page = await open()
   await filled(page)

@@ -55,6 +55,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/devices/{device}/joined": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The signals of one device that several points make up: hours out of hours, minutes and seconds, a clock out of its
+         *     parts.
+         * @description A signal that one point carries is named in that point's description.
+         */
+        get: operations["joined"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/devices/{device}/points": {
         parameters: {
             query?: never;
@@ -158,6 +179,23 @@ export interface paths {
         };
         /** The wires in the order of the site file. */
         get: operations["wires"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/wires/{wire}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** One wire in detail: its units, how long answers took, how its time is used, and the reads of each device on it. */
+        get: operations["wire"];
         put?: never;
         post?: never;
         delete?: never;
@@ -277,6 +315,11 @@ export interface components {
              * @example Genset low frequency
              */
             label: string;
+            /**
+             * @description Its id in the shared vocabulary.
+             * @example breaker.genset.closed
+             */
+            signal?: string;
         };
         /** @description One named value of a choice. */
         ChoiceView: {
@@ -301,6 +344,8 @@ export interface components {
         DeviceSnapshot: {
             /** @description The device. */
             device: components["schemas"]["DeviceView"];
+            /** @description What several of its points make up. */
+            joined: components["schemas"]["JoinedView"][];
             /** @description Its values, in address order. */
             values: components["schemas"]["ValueView"][];
         };
@@ -315,7 +360,7 @@ export interface components {
             alarms_fault: string | null;
             /**
              * @description One sentence on what is wrong with reaching the device; null while nothing is.
-             * @example Genset 1 cannot be read: unit 1 did not answer within 1s, asked 2 times: check the unit id and that the device is on
+             * @example Genset 1 cannot be read: unit 1 did not answer within 1s, asked 2 times: check the unit id and that the device is on; docs/connect/datakom-d.md says how to set it up and wire it
              */
             fault: string | null;
             /**
@@ -393,11 +438,93 @@ export interface components {
              */
             title: string;
         };
+        /** @description What a joined signal is: one value out of several points, such as hours out of hours, minutes and seconds. */
+        JoinedPointView: {
+            /**
+             * @description What it means.
+             * @example Hours the engine has run
+             */
+            meaning: string;
+            /** @description Ids of its points. */
+            points: string[];
+            /** @description How often its points are read. */
+            rate: components["schemas"]["Rate"];
+            /**
+             * @description Its id in the shared vocabulary.
+             * @example engine.hours
+             */
+            signal: string;
+            /**
+             * @description Its unit; null for a clock.
+             * @example h
+             */
+            unit: string | null;
+        };
+        /** @description What several points of a device make up now. */
+        JoinedView: {
+            /** @description As good as the worst of its points. */
+            quality: components["schemas"]["Quality"];
+            /**
+             * @description Its id in the shared vocabulary.
+             * @example engine.hours
+             */
+            signal: string;
+            ts: components["schemas"]["Time"] | null;
+            /**
+             * @description Its unit; null for a clock.
+             * @example h
+             */
+            unit: string | null;
+            /** @description Hours as a number, a clock as local date and time; null when there is none or when its points make none. */
+            value: components["schemas"]["PointValue"];
+        };
         /**
          * @description What kind of controller a device is.
          * @enum {string}
          */
         Kind: "genset" | "transfer_switch" | "compressor";
+        /** @description The answers that took longer than the bucket before allows, and no longer than this one. */
+        LatencyBucket: {
+            /**
+             * Format: int64
+             * @description How many there were.
+             */
+            count: number;
+            /**
+             * Format: double
+             * @description The longest time that belongs here, in milliseconds; null for the last bucket, which has no end.
+             * @example 5
+             */
+            up_to_ms: number | null;
+        };
+        /** @description How long answers took. */
+        LatencyView: {
+            /** @description How many answers took how long, the shortest first. */
+            buckets: components["schemas"]["LatencyBucket"][];
+            /**
+             * Format: int64
+             * @description Answers measured.
+             */
+            count: number;
+            /**
+             * Format: double
+             * @description The longest.
+             * @example 41.5
+             */
+            max_ms: number | null;
+            /**
+             * Format: double
+             * @description The mean.
+             * @example 3.2
+             */
+            mean_ms: number | null;
+            /**
+             * Format: double
+             * @description The shortest time, in milliseconds; null before the first answer.
+             * @example 1.9
+             */
+            min_ms: number | null;
+        };
         /** @description The mode a device is in. */
         ModeView: {
             /**
@@ -411,6 +538,105 @@ export interface components {
              * @example AUTO
              */
             label: string;
+        };
+        /** @description What one device is polled with. */
+        PlanView: {
+            /**
+             * @description Id of the device.
+             * @example gen1
+             */
+            device: string;
+            /**
+             * Format: double
+             * @description Share of the wire's time that polling it takes, 0 to 1; above 1 its rates cannot be kept. Null where the line's
+             *     speed is not known.
+             * @example 0.41
+             */
+            load: number | null;
+            /**
+             * Format: double
+             * @description The least time in which all of it can be read anew, its pauses included, in milliseconds; null where the line's
+             *     speed is not known.
+             * @example 553.7
+             */
+            refresh_ms: number | null;
+            /** @description Reads that the device refuses however small they are; they are tried again once a minute. */
+            refused: components["schemas"]["PlannedRead"][];
+            /** @description The rounds, the most frequent first; each reads what the one before it does, and more. */
+            rounds: components["schemas"]["PlannedRound"][];
+            /**
+             * Format: int32
+             * @description The pause it wants after each of its reads, in milliseconds.
+             * @example 500
+             */
+            spacing_ms: number;
+            /**
+             * Format: int32
+             * @description Its unit id.
+             * @example 1
+             */
+            unit: number;
+        };
+        /** @description One read of a plan. */
+        PlannedRead: {
+            /**
+             * Format: int32
+             * @description First register.
+             * @example 10246
+             */
+            address: number;
+            /**
+             * Format: int64
+             * @description Characters of the request and its full answer; over TCP, bytes.
+             * @example 45
+             */
+            characters: number;
+            /**
+             * Format: int32
+             * @description How many registers.
+             * @example 16
+             */
+            count: number;
+            /**
+             * Format: int32
+             * @description Function code.
+             * @example 3
+             */
+            function: number;
+            /**
+             * Format: double
+             * @description What it takes of the wire's time, with the silences before and after its answer, in milliseconds; null where the
+             *     line's speed is not known.
+             * @example 54.2
+             */
+            ms: number | null;
+            /** @description The rates of the points that it is for. */
+            rates: components["schemas"]["Rate"][];
+        };
+        /** @description The reads of one round. */
+        PlannedRound: {
+            /**
+             * Format: int64
+             * @description Characters of all its requests and answers; over TCP, bytes.
+             * @example 410
+             */
+            characters: number;
+            /**
+             * Format: double
+             * @description Seconds from one such round to the next; null for one that comes at the start and after the device was away.
+             * @example 1
+             */
+            every_s: number | null;
+            /**
+             * Format: double
+             * @description What it takes of the wire's time, in milliseconds; null where the line's speed is not known.
+             * @example 521.4
+             */
+            ms: number | null;
+            /** @description The rates that are due in it. */
+            rates: components["schemas"]["Rate"][];
+            /** @description Its reads, in address order. */
+            reads: components["schemas"]["PlannedRead"][];
         };
         /**
          * @description How a point's registers are read.
@@ -486,6 +712,8 @@ export interface components {
         PointsView: {
             /** @description The groups in the order of the profile. */
             groups: components["schemas"]["GroupView"][];
+            /** @description What several of its points make up, in the order of the profile. */
+            joined: components["schemas"]["JoinedPointView"][];
         };
         /** @description Why a request was not answered as asked, as `application/problem+json`. */
         Problem: {
@@ -593,6 +821,89 @@ export interface components {
          * @example 2026-11-23T10:15:30.123Z
          */
         Time: string;
+        /**
+         * @description What a unit did when it was asked last.
+         * @enum {string}
+         */
+        UnitState: "unknown" | "answering" | "missing" | "silent";
+        /** @description What went to and from one unit of a wire. */
+        UnitView: {
+            /**
+             * Format: int64
+             * @description Answers taken, exceptions included.
+             */
+            answers: number;
+            /**
+             * Format: int64
+             * @description Bytes received.
+             */
+            bytes_in: number;
+            /**
+             * Format: int64
+             * @description Bytes sent.
+             */
+            bytes_out: number;
+            /**
+             * Format: int64
+             * @description Frames whose checksum was wrong, while its answer was due.
+             */
+            crc_errors: number;
+            /**
+             * @description Id of the device; null for a unit that is none of the site.
+             * @example gen1
+             */
+            device: string | null;
+            /** @description Exceptions, by code. */
+            exceptions: components["schemas"]["ExceptionCount"][];
+            /**
+             * Format: int64
+             * @description Bytes that belonged to no frame, while its answer was due.
+             */
+            garbage: number;
+            /**
+             * Format: int64
+             * @description Polls that were held back while it was silent, so that the others keep their pace.
+             */
+            held: number;
+            /**
+             * Format: int64
+             * @description Answers that came after their time was up.
+             */
+            late: number;
+            /** @description How long its answers took. */
+            latency: components["schemas"]["LatencyView"];
+            /**
+             * Format: double
+             * @description Seconds until a silent unit is polled again; null for the others.
+             * @example 12.5
+             */
+            next_probe_s: number | null;
+            /**
+             * Format: int64
+             * @description Requests sent, repeats included.
+             */
+            requests: number;
+            /**
+             * Format: int64
+             * @description Reads that were sent once more.
+             */
+            retries: number;
+            /** @description What it did when it was asked last. */
+            state: components["schemas"]["UnitState"];
+            /** @description How much of the wire's time went to it. */
+            time: components["schemas"]["WireTime"];
+            /**
+             * Format: int64
+             * @description Requests that it did not answer in time.
+             */
+            timeouts: number;
+            /**
+             * Format: int32
+             * @description Its unit id.
+             * @example 1
+             */
+            unit: number;
+        };
         /** @description What a point reads now. */
         ValueView: {
             /**
@@ -639,10 +950,31 @@ export interface components {
              * @example gen1
              */
             device: string;
+            /** @description The joined signals whose value or quality changed. */
+            joined: components["schemas"]["JoinedView"][];
             /** @description Which of its points were read. */
             rate: components["schemas"]["Rate"];
             /** @description When the round was finished. */
             ts: components["schemas"]["Time"];
+        };
+        /** @description One wire in detail. */
+        WireDetailView: {
+            /** @description How long answers took, all units together. */
+            latency: components["schemas"]["LatencyView"];
+            /**
+             * Format: double
+             * @description Seconds since it was opened.
+             * @example 3600
+             */
+            open_s: number;
+            /** @description What the devices on it are polled with, in the order of the site file. */
+            plans: components["schemas"]["PlanView"][];
+            /** @description How its time was used, all units together. */
+            time: components["schemas"]["WireTime"];
+            /** @description The units that were asked, by unit id. */
+            units: components["schemas"]["UnitView"][];
+            /** @description The wire as the list of wires has it. */
+            wire: components["schemas"]["WireView"];
         };
         /**
          * @description Whether a wire is connected.
@@ -671,13 +1003,23 @@ export interface components {
              * @description Frames whose checksum was wrong.
              */
             crc_errors: number;
+            /**
+             * Format: int64
+             * @description Own requests that a converter sent back.
+             */
+            echoes: number;
             /** @description Exceptions, by code. */
             exceptions: components["schemas"]["ExceptionCount"][];
             /**
              * Format: int64
-             * @description Bytes that belonged to no frame.
+             * @description Bytes that belonged to no frame: noise.
              */
             garbage: number;
+            /**
+             * Format: int64
+             * @description Polls of silent units that were held back, so that the others keep their pace.
+             */
+            held: number;
             /**
              * Format: int64
              * @description Answers that came after their time was up.
@@ -699,6 +1041,11 @@ export interface components {
              * @description Requests sent, repeats included.
              */
             requests: number;
+            /**
+             * Format: int64
+             * @description Reads that were sent once more.
+             */
+            retries: number;
             /**
              * Format: int64
              * @description Requests that nobody answered in time.
@@ -729,6 +1076,33 @@ export interface components {
              * @description Answers from another unit than the one that was asked.
              */
             wrong_unit: number;
+        };
+        /** @description How much of a wire's time was used, and how. */
+        WireTime: {
+            /**
+             * Format: double
+             * @description Seconds in which characters were on the line; null where its speed is not known, as over TCP.
+             * @example 812.4
+             */
+            busy_s: number | null;
+            /**
+             * Format: double
+             * @description Share of the time since the wire was opened in which characters were on the line, 0 to 1.
+             * @example 0.23
+             */
+            busy_share: number | null;
+            /**
+             * Format: double
+             * @description Seconds in which an answer was waited for.
+             * @example 96.1
+             */
+            waiting_s: number;
+            /**
+             * Format: double
+             * @description Share of the time since the wire was opened in which an answer was waited for, 0 to 1.
+             * @example 0.03
+             */
+            waiting_share: number;
         };
         /** @description One wire and how it does. */
         WireView: {
@@ -823,6 +1197,50 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["DeviceView"];
+                };
+            };
+            /** @description There is no such device */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    joined: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description Id of the device
+                 * @example air1
+                 */
+                device: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Its joined signals */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JoinedView"][];
+                };
+            };
+            /** @description The id is no text */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description There is no such device */
@@ -1026,6 +1444,50 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["WireView"][];
+                };
+            };
+        };
+    };
+    wire: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description Id of the wire
+                 * @example gen1
+                 */
+                wire: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The wire */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["WireDetailView"];
+                };
+            };
+            /** @description The id is no text */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such wire */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
         };

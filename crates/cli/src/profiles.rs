@@ -97,10 +97,17 @@ pub(crate) fn load(path: &Path) -> Result<Profile, Failure> {
 
 /// The text of a file that the caller named.
 pub(crate) fn read(path: &Path, what: &str) -> Result<String, Failure> {
-    fs::read_to_string(path).map_err(|error| {
+    let file = path.display();
+    let bytes = fs::read(path).map_err(|error| {
         Failure::Failed(format!(
-            "{what} {} cannot be read: {error}; check the path and that you may read it",
-            path.display()
+            "{what} {file} cannot be read: {error}; check the path and that you may read it"
+        ))
+    })?;
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = error.utf8_error().valid_up_to();
+        let line = 1 + error.as_bytes().iter().take(valid).filter(|byte| **byte == b'\n').count();
+        Failure::Failed(format!(
+            "{what} {file} is not UTF-8 text: line {line} has other bytes; save it as UTF-8"
         ))
     })
 }

@@ -10,10 +10,11 @@ use busbar_profile::{Decoded, Image, Profile, Quality, Rate, reading};
 
 use crate::alarms::{self, Alarms};
 use crate::api::types::{
-    AlarmView, BitView, ChoiceView, DeviceView, GroupView, ModeView, PointView, PointsView, StateView, Time,
-    ValueView,
+    AlarmView, BitView, ChoiceView, DeviceView, GroupView, JoinedPointView, JoinedView, ModeView, PointView,
+    PointsView, StateView, Time, ValueView,
 };
 use crate::failure::Failure;
+use crate::joined::{self, Joined};
 use crate::poll_plan::polled;
 use crate::rates::{POLLED, Rates};
 use crate::site::SiteDevice;
@@ -37,6 +38,11 @@ pub(crate) struct Round {
 }
 
 impl Round {
+    /// When the wire lets a poll through again, where it held the last one back.
+    pub(crate) fn held(&self) -> Option<Duration> {
+        self.failures.last().and_then(|(_, failure)| failure.next_probe())
+    }
+
     /// Whether the device answered anything at all, if only to refuse.
     pub(crate) fn reached_the_device(&self) -> bool {
         !self.answers.is_empty() || self.failures.iter().any(|(_, failure)| failure.device_answered())
@@ -48,6 +54,8 @@ impl Round {
 pub(crate) struct Changes {
     /// Indexes of the points whose value or quality changed, in address order.
     pub(crate) values: Vec<usize>,
+    /// Indexes of the joined signals whose value or quality changed, in the order of the profile.
+    pub(crate) joined: Vec<usize>,
     /// Whether the device's own view changed.
     pub(crate) device: bool,
     /// Whether the list of active alarms changed.
@@ -63,6 +71,8 @@ pub(crate) struct Device {
     image: Image,
     /// By index in the profile.
     points: Vec<Point>,
+    /// By index in the profile's joined signals.
+    joined: Vec<Joined>,
     /// Indexes of the polled points, for each of [`POLLED`].
     polled: [Vec<usize>; POLLED.len()],
     /// When the last round was finished that the device answered, for each of [`POLLED`].
@@ -117,6 +127,7 @@ impl Device {
             wire,
             image: Image::new(profile),
             points: vec![Point::UNREAD; profile.points.len()],
+            joined: vec![Joined::default(); profile.joined().len()],
             polled: POLLED.map(|rate| polled(profile, rate)),
             rounds: [None; POLLED.len()],
             state: states.into_iter().find_map(signal),
@@ -134,6 +145,11 @@ impl Device {
 
     pub(crate) fn site(&self) -> &SiteDevice {
         &self.site
+    }
+
+    /// Id of its wire.
+    pub(crate) fn wire(&self) -> &str {
+        &self.wire
     }
 
     pub(crate) fn is_online(&self) -> bool {
@@ -159,6 +175,8 @@ impl Device {
         }
         changes.values.sort_unstable();
         changes.values.dedup();
+        self.join(&covered, ts);
+        changes.joined = self.rejudge();
         changes.device = !same_but_last_seen(&before, self.view());
         changes
     }
@@ -185,6 +203,7 @@ impl Device {
             }
         }
         if let Some((_, changes)) = expired.last_mut() {
+            changes.joined = self.rejudge();
             changes.device = !same_but_last_seen(&before, self.view());
         }
         expired
@@ -221,7 +240,10 @@ impl Device {
             return;
         };
         if !self.silence.as_ref().is_some_and(|known| failure.is_no_news_after(known)) {
-            self.fault = Some(format!("{name} cannot be read: {failure}"));
+            let page = &self.site.profile.key;
+            self.fault = Some(format!(
+                "{name} cannot be read: {failure}; docs/connect/{page}.md says how to set it up and wire it"
+            ));
             self.silence = Some(Arc::new(failure));
         }
         self.online = false;
@@ -329,6 +351,29 @@ impl Device {
         }
     }
 
+    /// Joins the signals whose points all came in this round: parts of two rounds could straddle a full hour.
+    fn join(&mut self, covered: &[bool], ts: Time) {
+        let profile = self.site.profile;
+        for (about, joined) in profile.joined().iter().zip(&mut self.joined) {
+            if about.points().all(|index| covered[index]) {
+                let reading = about.reading(profile, &self.image, self.site.word_order);
+                joined.read(reading.zip(Some(ts)));
+            }
+        }
+    }
+
+    /// The joined signals whose value or quality is another than before.
+    fn rejudge(&mut self) -> Vec<usize> {
+        let points = &self.points;
+        let signals = self.site.profile.joined().iter().zip(&mut self.joined).enumerate();
+        signals
+            .filter_map(|(index, (about, joined))| {
+                let parts = about.points().map(|part| points[part].quality());
+                joined.judge(parts).then_some(index)
+            })
+            .collect()
+    }
+
     fn stale_after(&self, rate: Rate) -> Option<Duration> {
         let interval = match rate {
             Rate::Fast => self.site.poll.fast,
@@ -421,6 +466,15 @@ impl Device {
         (0..self.points.len()).filter(|index| self.shows(*index)).map(|index| self.value(index)).collect()
     }
 
+    /// Every signal that several points make up, in the order of the profile.
+    pub(crate) fn joined_views(&self) -> Vec<JoinedView> {
+        (0..self.joined.len()).map(|index| self.joined(index)).collect()
+    }
+
+    pub(crate) fn joined(&self, index: usize) -> JoinedView {
+        self.joined[index].view(&self.site.profile.joined()[index])
+    }
+
     pub(crate) fn value(&self, index: usize) -> ValueView {
         let about = &self.site.profile.points[index];
         let point = &self.points[index];
@@ -454,7 +508,21 @@ pub(crate) fn points_view(profile: &Profile) -> PointsView {
             .map(point_view)
             .collect(),
     });
-    PointsView { groups: groups.filter(|group| !group.points.is_empty()).collect() }
+    PointsView {
+        groups: groups.filter(|group| !group.points.is_empty()).collect(),
+        joined: profile.joined().iter().map(|signal| joined_point_view(profile, signal)).collect(),
+    }
+}
+
+fn joined_point_view(profile: &Profile, signal: &busbar_profile::Joined) -> JoinedPointView {
+    let about = busbar_profile::vocabulary::vocabulary().signal(&signal.signal);
+    JoinedPointView {
+        signal: signal.signal.clone(),
+        meaning: about.map(|about| about.meaning.clone()).unwrap_or_default(),
+        unit: about.and_then(|about| about.unit.clone()),
+        rate: joined::rate(profile, signal).into(),
+        points: signal.points().map(|index| profile.points[index].id.clone()).collect(),
+    }
 }
 
 fn point_view(point: &busbar_profile::Point) -> PointView {
@@ -465,6 +533,7 @@ fn point_view(point: &busbar_profile::Point) -> PointView {
         id: bit.id.clone(),
         label: bit.label.clone(),
         class: bit.class.map(Into::into),
+        signal: bit.signal.clone(),
     };
     PointView {
         id: point.id.clone(),

@@ -1,5 +1,7 @@
 //! Why a point could not be read, as one sentence.
 
+use std::time::Duration;
+
 use busbar_link::{Cause, LinkError};
 use busbar_profile::Profile;
 use thiserror::Error;
@@ -58,11 +60,19 @@ impl Failure {
     /// Whether the device was asked and said nothing, though nothing else is known to be wrong.
     pub(crate) fn is_silence(&self) -> bool {
         match self {
-            Self::Link(LinkError::Timeout { .. }) => true,
+            Self::Link(LinkError::Timeout { .. } | LinkError::Silent { .. }) => true,
             Self::Link(LinkError::Down { reason }) => {
                 matches!(reason.cause, Cause::Silent { .. } | Cause::StillConnecting { .. })
             }
             _ => false,
+        }
+    }
+
+    /// How long until the wire lets a poll through again, where it held this one back for the sake of others.
+    pub(crate) fn next_probe(&self) -> Option<Duration> {
+        match self {
+            Self::Link(LinkError::Silent { next_probe, .. }) => Some(*next_probe),
+            _ => None,
         }
     }
 
@@ -74,8 +84,11 @@ impl Failure {
 
 #[cfg(test)]
 mod tests {
-    use busbar_link::Cause;
+    use std::time::Duration;
 
+    use busbar_link::{Cause, LinkError};
+
+    use super::Failure;
     use crate::testing::{outage, refusal, timeout};
 
     #[test]
@@ -89,6 +102,10 @@ mod tests {
         assert!(timeout().is_silence() && !timeout().device_answered());
         assert!(outage(Cause::Silent { requests: 3 }).is_silence() && !outage(Cause::Refused).is_silence());
         assert!(!outage(Cause::Refused).is_no_news_after(&timeout()));
+        let again = Duration::from_millis(700);
+        let held = Failure::Link(LinkError::Silent { unit: 1, next_probe: again });
+        assert!(held.is_silence() && held.is_no_news_after(&timeout()) && !held.device_answered());
+        assert_eq!((held.next_probe(), timeout().next_probe()), (Some(again), None));
         assert!(refusal(2).is_illegal_address() && !refusal(3).is_illegal_address());
         assert!(refusal(2).device_answered() && !refusal(2).is_silence());
     }

@@ -77,6 +77,9 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     let listener = listen(options.listen.unwrap_or(site.listen)).await?;
     let address = listener.local_addr().map_err(|error| refused(site.listen, &error))?;
     let links = open(&site)?;
+    for warning in &site.warnings {
+        tracing::warn!("{warning}");
+    }
 
     let (stop, stopped) = stop::channel();
     let devices =
@@ -88,8 +91,7 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     for (index, device) in site.devices.iter().enumerate() {
         let cost = wires::cost(&site.wires[device.wire].endpoint, device.profile);
         let link = wires::for_polling(&links[device.wire]);
-        let shared = site.devices.iter().filter(|other| other.wire == device.wire).count() > 1;
-        let wire = PolledWire { link, cost, shared };
+        let wire = PolledWire { link, cost };
         tasks.spawn(Poller::new(Arc::clone(&hub), index, device.clone(), wire).run());
     }
     tasks.spawn(age(Arc::clone(&hub)));

@@ -13,13 +13,16 @@ use tokio::sync::broadcast;
 use tokio::time::Instant;
 
 use crate::api::types::{
-    AlarmView, AlarmsEvent, DeviceSnapshot, DeviceView, PointsView, SiteInfo, SiteView, SnapshotEvent, Time,
-    ValueView, ValuesEvent, WireView,
+    AlarmView, AlarmsEvent, DeviceSnapshot, DeviceView, JoinedView, PointsView, SiteInfo, SiteView,
+    SnapshotEvent, Time, ValueView, ValuesEvent, WireDetailView, WireView,
 };
 use crate::api::{Problem, ValuesQuery};
 use crate::device::{Changes, Device, Round, points_view};
 use crate::events::{Event, frame};
+use crate::joined;
+use crate::poll_plan::Overview;
 use crate::rates::Rates;
+use crate::site::SiteDevice;
 use crate::stop::Stop;
 use crate::wires;
 
@@ -40,6 +43,8 @@ struct Slot {
     id: String,
     points: PointsView,
     live: Mutex<Live>,
+    /// What it is read with; empty until its poller has begun.
+    plan: Mutex<Overview>,
 }
 
 #[derive(Debug)]
@@ -64,6 +69,7 @@ impl Hub {
             id: device.site().id.clone(),
             points: points_view(device.site().profile),
             live: Mutex::new(Live { device, sequence: 0 }),
+            plan: Mutex::default(),
         };
         Self {
             info: SiteInfo { name, version: env!("CARGO_PKG_VERSION").to_owned(), started: wall_clock() },
@@ -96,6 +102,11 @@ impl Hub {
         self.publish(device, &mut live, &rounds);
     }
 
+    /// Takes over what a device is read with from now on.
+    pub(crate) fn planned(&self, device: usize, plan: Overview) {
+        *self.devices[device].plan.lock().unwrap_or_else(PoisonError::into_inner) = plan;
+    }
+
     /// Marks what became too old on any device.
     pub(crate) fn expire(&self) {
         for (index, slot) in self.devices.iter().enumerate() {
@@ -126,6 +137,7 @@ impl Hub {
                 rate: (*rate).into(),
                 ts: *ts,
                 changed: changed.map(|point| device.value(*point)).collect(),
+                joined: changes.joined.iter().map(|signal| device.joined(*signal)).collect(),
             };
             frame(&mut frames, "values", &values);
             if changes.alarms {
@@ -198,6 +210,10 @@ impl Hub {
         Ok((0..profile.points.len()).filter(wanted).map(|index| live.device.value(index)).collect())
     }
 
+    pub(crate) fn joined(&self, id: &str) -> Result<Vec<JoinedView>, Problem> {
+        Ok(self.slot(id)?.lock().device.joined_views())
+    }
+
     pub(crate) fn alarms(&self) -> Vec<AlarmView> {
         let mut alarms: Vec<AlarmView> =
             self.devices.iter().flat_map(|slot| slot.lock().device.alarm_views()).collect();
@@ -207,6 +223,18 @@ impl Hub {
 
     pub(crate) fn wires(&self) -> Vec<WireView> {
         self.wires.iter().map(|(id, link)| wires::view(id, link)).collect()
+    }
+
+    pub(crate) fn wire(&self, id: &str) -> Result<WireDetailView, Problem> {
+        let (id, link) = self.wires.iter().find(|wire| wire.0 == id).ok_or_else(|| self.unknown_wire(id))?;
+        let on_it = self.devices.iter().filter(|slot| slot.lock().device.wire() == id);
+        let devices: Vec<(SiteDevice, Overview)> = on_it
+            .map(|slot| {
+                let plan = slot.plan.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                (slot.lock().device.site().clone(), plan)
+            })
+            .collect();
+        Ok(wires::detail(id, link, &devices))
     }
 
     /// Index of a device.
@@ -224,7 +252,11 @@ impl Hub {
             }
             let live = slot.lock();
             sequences[index] = live.sequence;
-            let device = DeviceSnapshot { device: live.device.view(), values: live.device.values() };
+            let device = DeviceSnapshot {
+                device: live.device.view(),
+                values: live.device.values(),
+                joined: live.device.joined_views(),
+            };
             snapshot.devices.push(device);
             snapshot.alarms.extend(live.device.alarm_views());
         }
@@ -238,6 +270,15 @@ impl Hub {
 
     fn slot(&self, id: &str) -> Result<&Slot, Problem> {
         Ok(&self.devices[self.index(id)?])
+    }
+
+    fn unknown_wire(&self, id: &str) -> Problem {
+        let known: Vec<&str> = self.wires.iter().map(|(id, _)| id.as_str()).collect();
+        let detail = match known.as_slice() {
+            [] => format!("there is no wire {id}: this site has none"),
+            known => format!("there is no wire {id}; this site has {}", known.join(", ")),
+        };
+        Problem::new(StatusCode::NOT_FOUND, detail)
     }
 
     fn unknown(&self, id: &str) -> Problem {
@@ -257,6 +298,13 @@ fn by_rate(rates: Rates, ts: Time, changes: Changes, profile: &Profile) -> Vec<(
         let own = rounds.iter().position(|(rate, ..)| *rate == profile.points[index].rate);
         if let Some((.., of_rate)) = rounds.get_mut(own.unwrap_or(0)) {
             of_rate.values.push(index);
+        }
+    }
+    for index in changes.joined {
+        let own =
+            rounds.iter().position(|(rate, ..)| *rate == joined::rate(profile, &profile.joined()[index]));
+        if let Some((.., of_rate)) = rounds.get_mut(own.unwrap_or(0)) {
+            of_rate.joined.push(index);
         }
     }
     if let Some((.., last)) = rounds.last_mut() {

@@ -14,6 +14,7 @@ mod events;
 mod failure;
 mod gateway;
 mod hub;
+mod joined;
 mod page;
 mod patience;
 mod poll_plan;

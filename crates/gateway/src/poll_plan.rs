@@ -5,7 +5,7 @@ use std::time::Duration;
 use busbar_profile::plan::{Cost, Planner, Read};
 use busbar_profile::{Point, Profile, Rate};
 
-use crate::rates::Rates;
+use crate::rates::{POLLED, Rates};
 
 /// A point that the device refuses by itself is asked for again this long after, in case it changed its mind.
 const REST: Duration = Duration::from_secs(60);
@@ -23,6 +23,23 @@ pub(crate) struct PollPlan {
     mute: Vec<Mute>,
     /// Where a round begins.
     first: u16,
+}
+
+/// The reads of a round in which these rates are due.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct PlannedRound {
+    pub(crate) rates: Rates,
+    /// In address order, each with the rates that it serves.
+    pub(crate) reads: Vec<(Read, Rates)>,
+}
+
+/// The plan as it stands, for people.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Overview {
+    /// What is due most often first; each round holds the rates of the one before it.
+    pub(crate) rounds: Vec<PlannedRound>,
+    /// Reads that the device refuses however small they are.
+    pub(crate) refused: Vec<Read>,
 }
 
 /// A read without an answer.
@@ -76,6 +93,22 @@ impl PollPlan {
     /// only that part which never answers.
     pub(crate) fn gave_up_at(&mut self, read: Read) {
         self.first = read.address.saturating_add(read.count);
+    }
+
+    /// The plan as it stands now.
+    pub(crate) fn overview(&self) -> Overview {
+        let mut rounds: Vec<PlannedRound> = Vec::new();
+        let mut rates = Vec::new();
+        for rate in POLLED.into_iter().filter(|rate| self.has(*rate)) {
+            rates.push(rate);
+            let due: Rates = rates.iter().copied().collect();
+            let serving = |read| rates.iter().copied().filter(|rate| self.serves(*rate, read)).collect();
+            let reads = self.planner.reads(self.wanted(due)).into_iter().map(|read| (read, serving(read)));
+            rounds.push(PlannedRound { rates: due, reads: reads.collect() });
+        }
+        let mut refused: Vec<Read> = self.refused.iter().map(|(read, _)| *read).collect();
+        refused.sort_unstable_by_key(|read| read.address);
+        Overview { rounds, refused }
     }
 
     /// Whether a point of this rate is in a read that had no answer.
@@ -212,6 +245,33 @@ mod tests {
         assert_eq!(spans(&plan.reads(together, at(0))), [(100, 12), (126, 2)]);
         let due = plan.planner.due(profile(), &[Rate::Fast, Rate::Slow]);
         assert_eq!(plan.reads(together, at(0)), due.reads);
+    }
+
+    #[test]
+    fn the_plan_can_be_shown() {
+        let mut plan = plan();
+        let shown = |plan: &PollPlan| {
+            let round = |round: &PlannedRound| {
+                let reads: Vec<_> = round.reads.iter().map(|(read, _)| *read).collect();
+                (round.rates.iter().collect::<Vec<_>>(), spans(&reads))
+            };
+            plan.overview().rounds.iter().map(round).collect::<Vec<_>>()
+        };
+        let (fast, slow, once) = (Rate::Fast, Rate::Slow, Rate::Once);
+        let rounds = shown(&plan);
+        assert_eq!(rounds[0], (vec![fast], vec![(100, 12)]));
+        assert_eq!(rounds[1], (vec![fast, slow], vec![(100, 12), (126, 2)]));
+        assert_eq!((rounds.len(), &rounds[2].0), (3, &vec![fast, slow, once]));
+        let serves: Vec<Vec<Rate>> =
+            plan.overview().rounds[1].reads.iter().map(|(_, rates)| rates.iter().collect()).collect();
+        assert_eq!(serves, [vec![fast, slow], vec![slow]]);
+
+        // What the device refuses is told, and what it taught is planned around.
+        let parts = plan.refused(fast.into(), Read { function: 3, address: 100, count: 12 }, at(0));
+        assert_eq!(shown(&plan)[0].1, spans(&parts));
+        let single = Read { function: 3, address: 111, count: 1 };
+        assert!(plan.refused(fast.into(), single, at(0)).is_empty());
+        assert_eq!(plan.overview().refused, [single]);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::failure::Failure;
 use crate::hub::Hub;
 use crate::poll_plan::PollPlan;
 use crate::rates::{POLLED, Rates};
-use crate::schedule::{Pace, Schedule};
+use crate::schedule::Schedule;
 use crate::site::SiteDevice;
 use crate::wires;
 
@@ -28,9 +28,6 @@ pub(crate) struct Poller {
     link: Link,
     wire: watch::Receiver<WireState>,
     plan: PollPlan,
-    pace: Pace,
-    /// Whether there are other devices on the wire.
-    shared: bool,
     /// Whether the wire itself failed: then its return is worth a try at once.
     wire_failed: bool,
 }
@@ -40,17 +37,16 @@ pub(crate) struct PolledWire {
     pub(crate) link: Link,
     /// What a read costs on it.
     pub(crate) cost: Cost,
-    /// Whether there are other devices on it.
-    pub(crate) shared: bool,
 }
 
 impl Poller {
     pub(crate) fn new(hub: Arc<Hub>, device: usize, site: SiteDevice, wire: PolledWire) -> Self {
-        let PolledWire { link, cost, shared } = wire;
+        let PolledWire { link, cost } = wire;
         let plan = PollPlan::new(site.profile, cost);
-        let pace = Pace::new(wires::spacing(site.profile));
-        let link = link.with_short_answers(site.profile.wire.over_read == OverRead::Truncate);
-        Self { hub, device, wire: link.state(), site, link, plan, pace, shared, wire_failed: false }
+        let link = link
+            .with_short_answers(site.profile.wire.over_read == OverRead::Truncate)
+            .with_spacing(wires::spacing(site.profile));
+        Self { hub, device, wire: link.state(), site, link, plan, wire_failed: false }
     }
 
     pub(crate) async fn run(mut self) {
@@ -65,15 +61,18 @@ impl Poller {
         let Some(probe) = POLLED.into_iter().find(|rate| self.plan.has(*rate)) else { return };
         let mut schedule = Schedule::new(self.site.poll, self.hub.now());
         let mut answered = false;
+        self.hub.planned(self.device, self.plan.overview());
         loop {
             let due = self.next(&mut schedule).await;
             let rates = if schedule.is_silent() { probe.into() } else { due };
-            let began = self.hub.now();
             let round = self.round(rates, schedule.is_silent()).await;
             match &round.silence {
                 Some(failure) => {
                     let now = self.hub.now();
-                    schedule.silent(now, now.saturating_sub(began), self.shared);
+                    match round.held() {
+                        Some(again) => schedule.held(now, again),
+                        None => schedule.silent(now),
+                    }
                     self.wire_failed = !failure.is_silence();
                 }
                 None => {
@@ -136,14 +135,17 @@ impl Poller {
             if is_silence {
                 mute.push((*read, failure.clone()));
             }
-            if is_silence && unanswered < SILENT_READS && !probing && reads.len() > 1 {
+            let held = failure.next_probe().is_some();
+            if is_silence && unanswered < SILENT_READS && !probing && reads.len() > 1 && !held {
                 continue;
             }
             // What comes behind is not worth its time-outs now.
             if is_silence && round.reached_the_device() {
                 round.failures.extend(reads[sent + 1..].iter().map(|read| (*read, failure.clone())));
             } else {
-                self.plan.gave_up_at(*read);
+                if !held {
+                    self.plan.gave_up_at(*read);
+                }
                 // The first silence says most: what followed may be the wire's being made anew for it.
                 let first = mute.first().filter(|_| is_silence).map(|(_, failure)| failure.clone());
                 round.silence = Some(first.unwrap_or(failure));
@@ -162,9 +164,7 @@ impl Poller {
         let mut waiting = vec![read];
         while let Some(read) = waiting.pop() {
             let function = self.site.profile.wire.read_function();
-            tokio::time::sleep(self.pace.wait(self.hub.now())).await;
             let answer = self.link.read_registers(self.site.unit, function, read.address, read.count).await;
-            self.pace.done(self.hub.now());
             let failure = match answer {
                 Ok(registers) if registers.len() == usize::from(read.count) => {
                     round.answers.push((read.address, registers));
@@ -176,6 +176,7 @@ impl Poller {
             };
             if failure.is_illegal_address() {
                 let parts = self.plan.refused(rates, read, self.hub.now());
+                self.hub.planned(self.device, self.plan.overview());
                 if !parts.is_empty() {
                     waiting.extend(parts.into_iter().rev());
                     continue;

@@ -10,8 +10,8 @@ use crate::site::Poll;
 /// A silent device is probed at least this often, so that its return is seen soon.
 const LONGEST_PAUSE: Duration = Duration::from_secs(10);
 
-/// The same where each probe costs others their time.
-const LONGEST_SHARED_PAUSE: Duration = Duration::from_secs(30);
+/// Between two tries at least.
+const LEAST_PAUSE: Duration = Duration::from_millis(10);
 
 /// When each rate of a device is due.
 #[derive(Debug)]
@@ -81,15 +81,18 @@ impl Schedule {
         self.once = Some(self.once.map_or(at, |once| once.min(at)));
     }
 
-    /// The device did not answer a round that took `took`: the next try comes after a pause that grows. On a wire that
-    /// others share its probes take a tenth of the time at most.
-    pub(crate) fn silent(&mut self, now: Duration, took: Duration, shared: bool) {
+    /// The device did not answer a round: the next try comes after a pause that grows.
+    pub(crate) fn silent(&mut self, now: Duration) {
         let unanswered = self.silent.map_or(0, |(_, unanswered)| unanswered);
-        let pause =
-            self.poll.fast.saturating_mul(1 << unanswered.min(16)).min(LONGEST_PAUSE.max(self.poll.fast));
-        let least = if shared && unanswered > 0 { took.saturating_mul(9) } else { Duration::ZERO };
-        let pause = pause.max(least.min(LONGEST_SHARED_PAUSE));
+        let pause = self.poll.fast.saturating_mul(1 << unanswered.min(16));
+        let pause = pause.min(LONGEST_PAUSE.max(self.poll.fast));
         self.silent = Some((now + pause, unanswered.saturating_add(1)));
+    }
+
+    /// The wire did not let a try through, for the sake of others on it, and will `again` after so long.
+    pub(crate) fn held(&mut self, now: Duration, again: Duration) {
+        let unanswered = self.silent.map_or(0, |(_, unanswered)| unanswered);
+        self.silent = Some((now + again.max(LEAST_PAUSE), unanswered));
     }
 
     /// Something changed on the wire: a silent device is worth a probe at once.
@@ -97,29 +100,6 @@ impl Schedule {
         if let Some((at, _)) = &mut self.silent {
             *at = now;
         }
-    }
-}
-
-/// Keeps the pause that a device wants between the end of one exchange and the next, whatever others on the wire do.
-#[derive(Debug)]
-pub(crate) struct Pace {
-    pause: Duration,
-    earliest: Duration,
-}
-
-impl Pace {
-    pub(crate) fn new(pause: Duration) -> Self {
-        Self { pause, earliest: Duration::ZERO }
-    }
-
-    /// How long to wait before the next read.
-    pub(crate) fn wait(&self, now: Duration) -> Duration {
-        self.earliest.saturating_sub(now)
-    }
-
-    /// An exchange is over, answered or not.
-    pub(crate) fn done(&mut self, now: Duration) {
-        self.earliest = now + self.pause;
     }
 }
 
@@ -230,7 +210,7 @@ mod tests {
         let mut now = Duration::ZERO;
         let mut pauses = Vec::new();
         for _ in 0..7 {
-            schedule.silent(now, ms(2_000), false);
+            schedule.silent(now);
             let due = schedule.next();
             pauses.push((due - now).as_secs());
             now = due;
@@ -244,35 +224,28 @@ mod tests {
     }
 
     #[test]
-    fn probes_on_a_shared_wire_leave_it_to_the_others() {
+    fn a_probe_that_the_wire_held_back_comes_when_it_lets_it_through() {
         let mut schedule = Schedule::new(POLL, Duration::ZERO);
-        // It may have been a moment only.
-        schedule.silent(ms(4_000), ms(4_000), true);
-        assert_eq!(schedule.next(), ms(5_000));
-        schedule.silent(ms(7_000), ms(2_000), true);
-        assert_eq!(schedule.next(), ms(25_000));
-        schedule.silent(ms(30_000), ms(5_000), true);
-        assert_eq!(schedule.next(), ms(60_000), "its return is seen all the same");
+        schedule.silent(ms(4_000));
+        schedule.held(ms(5_000), ms(700));
+        assert_eq!((schedule.next(), schedule.is_silent()), (ms(5_700), true));
+        // It said nothing about the device: the pauses grow as if it had not been.
+        schedule.silent(ms(6_700));
+        assert_eq!(schedule.next(), ms(8_700));
+        schedule.held(ms(8_700), Duration::ZERO);
+        assert!(schedule.next() > ms(8_700), "never in the same instant");
     }
 
     #[test]
     fn after_silence_everything_is_read_again() {
         let mut schedule = Schedule::new(POLL, Duration::ZERO);
         play(&mut schedule, ms(3_000), ms(1));
-        schedule.silent(ms(3_100), ms(100), false);
+        schedule.silent(ms(3_100));
         schedule.done(rates([Rate::Fast]), ms(5_000));
         assert!(!schedule.is_silent());
         assert_eq!((schedule.next(), schedule.due(ms(5_000))), (ms(5_000), rates([Rate::Slow, Rate::Once])));
         schedule.done(rates([Rate::Slow, Rate::Once]), ms(5_020));
         assert_eq!((schedule.next(), schedule.due(ms(6_000))), (ms(6_000), rates([Rate::Fast])));
         assert_eq!(schedule.due(ms(15_000)), rates([Rate::Fast, Rate::Slow]), "and they fall together again");
-    }
-
-    #[test]
-    fn a_pause_runs_from_the_end_of_an_exchange() {
-        let mut pace = Pace::new(ms(500));
-        assert_eq!(pace.wait(Duration::ZERO), Duration::ZERO);
-        pace.done(ms(100));
-        assert_eq!((pace.wait(ms(100)), pace.wait(ms(250)), pace.wait(ms(700))), (ms(500), ms(350), ms(0)));
     }
 }

@@ -1,5 +1,6 @@
 //! The site file: which wires and devices there are. TOML, checked as a whole before anything starts.
 
+mod checks;
 mod reader;
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -8,15 +9,17 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use busbar_link::Endpoint;
-use busbar_profile::{Collector, Findings, Profile, WordOrder};
+use busbar_profile::{Collector, Finding, Findings, Profile, WordOrder};
 use toml::de::DeTable;
 
+use self::checks::{PlacedDevice, PlacedWire};
 use self::reader::{At, Table};
 
 /// Where the gateway listens unless it is told otherwise: this machine only.
 pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
 
 const TIMEOUT: RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(60);
+const SPACING: RangeInclusive<Duration> = Duration::ZERO..=Duration::from_secs(10);
 const POLL: RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(3600);
 
 /// A site: its wires and the devices on them. Everything in it has been checked.
@@ -31,6 +34,8 @@ pub struct Site {
     pub wires: Vec<SiteWire>,
     /// The devices, in the order of the file; ids are unique.
     pub devices: Vec<SiteDevice>,
+    /// What may well work and still deserves a look, in the order of the file.
+    pub warnings: Vec<Finding>,
 }
 
 /// One wire of a site.
@@ -43,6 +48,9 @@ pub struct SiteWire {
     pub endpoint: Endpoint,
     /// How long to wait for an answer; none: as long as the profiles of its devices say.
     pub timeout: Option<Duration>,
+    /// Least pause between an exchange and the next request, whichever unit they are with; none: no more than the
+    /// line and its devices need.
+    pub spacing: Option<Duration>,
 }
 
 /// One device of a site.
@@ -102,22 +110,26 @@ impl Site {
         findings.finish()?;
 
         let mut findings = Collector::new(file, text);
-        let site = read(&Table::new("a site file", KEYS, root.get_ref(), 0..0, &mut findings), &mut findings);
+        let mut warnings = Collector::new(file, text);
+        let root = Table::new("a site file", KEYS, root.get_ref(), 0..0, &mut findings);
+        let site = read(&root, &mut findings, &mut warnings);
         findings.finish()?;
-        Ok(site)
+        let warnings = warnings.finish().err().into_iter().flatten().collect();
+        Ok(Self { warnings, ..site })
     }
 }
 
-const ENDPOINT_HELP: &str = "write an endpoint such as \"tcp://192.168.1.20:502\"";
+const ENDPOINT_HELP: &str =
+    "write an endpoint such as \"tcp://192.168.1.20:502\" or \"rtu:///dev/ttyUSB0?baud=9600\"";
 const KEYS: &[&str] = &["site", "server", "wires", "devices"];
 const SITE_KEYS: &[&str] = &["name"];
 const SERVER_KEYS: &[&str] = &["listen"];
-const WIRE_KEYS: &[&str] = &["id", "endpoint", "timeout"];
+const WIRE_KEYS: &[&str] = &["id", "endpoint", "timeout", "spacing"];
 const DEVICE_KEYS: &[&str] = &["id", "name", "profile", "wire", "unit", "word_order", "poll"];
 const POLL_KEYS: &[&str] = &["fast", "slow"];
 
 /// What stands in for a part that has been reported missing or wrong is never seen: the findings stop it.
-fn read(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Site {
+fn read(root: &Table<'_, '_>, findings: &mut Collector<'_>, warnings: &mut Collector<'_>) -> Site {
     let site = root.required("site", "{ name = \"North hospital\" }", findings, |root, key, findings| {
         root.table(key, "[site]", SITE_KEYS, findings)
     });
@@ -130,11 +142,15 @@ fn read(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Site {
         .unwrap_or(DEFAULT_LISTEN);
     let wires = wires(root, findings);
     let devices = devices(root, &wires, findings);
+    checks::serial(&wires, &devices, findings);
+    checks::crowded(&wires, &devices, warnings);
+    checks::doubtful_units(&devices, warnings);
     Site {
         name: name.unwrap_or_default(),
         listen,
-        wires: wires.into_iter().filter_map(|wire| wire.1).collect(),
-        devices,
+        wires: wires.into_iter().filter_map(|wire| wire.wire).collect(),
+        devices: devices.into_iter().map(|placed| placed.device).collect(),
+        warnings: Vec::new(),
     }
 }
 
@@ -155,73 +171,98 @@ fn listen(server: &Table<'_, '_>, findings: &mut Collector<'_>) -> Option<Socket
 }
 
 /// The wires by id; one whose id is right but whose endpoint is not still counts as defined.
-fn wires(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<(String, Option<SiteWire>)> {
-    let mut wires: Vec<(String, Option<SiteWire>)> = Vec::new();
+fn wires(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<PlacedWire> {
+    let mut wires: Vec<PlacedWire> = Vec::new();
     for table in root.tables("wires", "[[wires]]", WIRE_KEYS, findings) {
-        let id = id(&table, "wire", wires.iter().map(|wire| wire.0.as_str()), findings);
+        let id = id(&table, "wire", wires.iter().map(|wire| wire.id.as_str()), findings);
         let endpoint =
             table.required("endpoint", "\"tcp://192.168.1.20:502\"", findings, |table, key, findings| {
-                let text = table.string(key, findings)?;
-                match text.value.parse::<Endpoint>() {
-                    Ok(endpoint) => reachable(endpoint, text.span, &wires, findings),
-                    Err(error) => {
-                        // The link's sentences hold the remedy behind the semicolon.
-                        let problem = error.problem.to_string();
-                        let (message, help) = problem.split_once("; ").unwrap_or((&problem, ENDPOINT_HELP));
-                        findings.add(text.span, format!("`{}` is no endpoint: {message}", text.value), help);
-                        None
-                    }
-                }
+                endpoint(table, key, &wires, findings)
             });
         let timeout = table.duration("timeout", TIMEOUT, findings).map(|timeout| timeout.value);
+        let spacing = table.duration("spacing", SPACING, findings).map(|spacing| spacing.value);
         if let Some(id) = id {
-            let wire = endpoint.map(|endpoint| SiteWire { id: id.clone(), endpoint, timeout });
-            wires.push((id, wire));
+            let at = endpoint.as_ref().map_or(0..0, |endpoint| endpoint.span.clone());
+            let wire = endpoint.map(|endpoint| SiteWire {
+                id: id.clone(),
+                endpoint: endpoint.value,
+                timeout,
+                spacing,
+            });
+            wires.push(PlacedWire { id, wire, endpoint: at });
         }
     }
     wires
 }
 
-/// An endpoint that something can listen on and that no other wire has: a controller takes one client, and only on one
-/// wire do requests keep out of each other's way.
+fn endpoint(
+    table: &Table<'_, '_>,
+    key: &str,
+    wires: &[PlacedWire],
+    findings: &mut Collector<'_>,
+) -> Option<At<Endpoint>> {
+    let text = table.string(key, findings)?;
+    match text.value.parse::<Endpoint>() {
+        Ok(endpoint) => reachable(endpoint, text.span, wires, findings),
+        Err(error) => {
+            // The link's sentences hold the remedy behind the semicolon.
+            let problem = error.problem.to_string();
+            let (message, help) = problem.split_once("; ").unwrap_or((&problem, ENDPOINT_HELP));
+            findings.add(text.span, format!("`{}` is no endpoint: {message}", text.value), help);
+            None
+        }
+    }
+}
+
+/// An endpoint that this version speaks, that something can listen on and that no other wire has: a controller takes
+/// one client, and only on one wire do requests keep out of each other's way.
 fn reachable(
     endpoint: Endpoint,
     span: Range<usize>,
-    wires: &[(String, Option<SiteWire>)],
+    wires: &[PlacedWire],
     findings: &mut Collector<'_>,
-) -> Option<Endpoint> {
-    if let Endpoint::Tcp { port: 0, .. } | Endpoint::RtuTcp { port: 0, .. } | Endpoint::Tls { port: 0, .. } =
-        endpoint
-    {
-        findings.add(
-            span,
+) -> Option<At<Endpoint>> {
+    let refused = match &endpoint {
+        Endpoint::Tls { .. } => Some((
+            format!("`{endpoint}` cannot be spoken: this version has no TLS"),
+            "write a tcp:// endpoint; a TLS tunnel in front of the device, such as stunnel, can carry it"
+                .into(),
+        )),
+        Endpoint::Tcp { port: 0, .. } | Endpoint::RtuTcp { port: 0, .. } => Some((
             format!("`{endpoint}` cannot be connected to: nothing listens on port 0"),
-            "write the port of the device, or leave it out for the usual one",
-        );
-        return None;
-    }
-    let same = |wire: &SiteWire| match (&wire.endpoint, &endpoint) {
-        // However the line is set, it is one line.
-        (Endpoint::Rtu { path, .. }, Endpoint::Rtu { path: other, .. }) => path == other,
-        (one, other) => one.to_string().eq_ignore_ascii_case(&other.to_string()),
+            "write the port of the device, or leave it out for the usual one".into(),
+        )),
+        // A new pseudo-terminal is for an imitation to listen on; nobody is at the other end of ours.
+        Endpoint::Rtu { path, .. } if path == "pty" => Some((
+            format!("`{endpoint}` cannot be connected to: `pty` is no serial device"),
+            "write the device that the imitation printed, such as \"rtu:///dev/pts/3\"".into(),
+        )),
+        endpoint => wires.iter().find(|wire| is_same_end(wire, endpoint)).map(|PlacedWire { id, .. }| {
+            (
+                format!("`{endpoint}` is the endpoint of the wire `{id}` already"),
+                format!("put all devices that are reached through it on the wire `{id}`"),
+            )
+        }),
     };
-    if let Some((id, _)) = wires.iter().find(|wire| wire.1.as_ref().is_some_and(same)) {
-        findings.add(
-            span,
-            format!("`{endpoint}` is the endpoint of the wire `{id}` already"),
-            format!("put all devices that are reached through it on the wire `{id}`"),
-        );
-        return None;
+    match refused {
+        Some((message, help)) => {
+            findings.add(span, message, help);
+            None
+        }
+        None => Some(At { value: endpoint, span }),
     }
-    Some(endpoint)
 }
 
-fn devices(
-    root: &Table<'_, '_>,
-    wires: &[(String, Option<SiteWire>)],
-    findings: &mut Collector<'_>,
-) -> Vec<SiteDevice> {
-    let mut devices: Vec<SiteDevice> = Vec::new();
+/// Whether a wire ends there already. However a line is set, it is one line.
+fn is_same_end(wire: &PlacedWire, endpoint: &Endpoint) -> bool {
+    wire.wire.as_ref().is_some_and(|wire| match (&wire.endpoint, endpoint) {
+        (Endpoint::Rtu { path, .. }, Endpoint::Rtu { path: other, .. }) => path == other,
+        (one, other) => one.to_string().eq_ignore_ascii_case(&other.to_string()),
+    })
+}
+
+fn devices(root: &Table<'_, '_>, wires: &[PlacedWire], findings: &mut Collector<'_>) -> Vec<PlacedDevice> {
+    let mut devices: Vec<PlacedDevice> = Vec::new();
     let mut ids: Vec<String> = Vec::new();
     for table in root.tables("devices", "[[devices]]", DEVICE_KEYS, findings) {
         let id = id(&table, "device", ids.iter().map(String::as_str), findings);
@@ -236,23 +277,25 @@ fn devices(
         let poll = poll(&table, findings);
 
         let (Some(id), Some(profile), Some(wire), Some(unit)) = (id, profile, wire, unit) else { continue };
-        if let Some(other) = devices.iter().find(|other| (other.wire, other.unit) == (wire, unit.value)) {
+        let same = |other: &&PlacedDevice| (other.device.wire, other.device.unit) == (wire.value, unit.value);
+        if let Some(PlacedDevice { device: other, .. }) = devices.iter().find(same) {
             findings.add(
                 unit.span,
-                format!("unit {} on wire {} is {} already", unit.value, wires[wire].0, other.id),
+                format!("unit {} on wire {} is {} already", unit.value, wires[wire.value].id, other.id),
                 "give every device on a wire a unit id of its own",
             );
             continue;
         }
-        devices.push(SiteDevice {
+        let device = SiteDevice {
             name: name.unwrap_or_else(|| id.clone()),
             id,
             profile,
-            wire,
+            wire: wire.value,
             unit: unit.value,
             word_order: word_order.unwrap_or(profile.wire.word_order),
             poll,
-        });
+        };
+        devices.push(PlacedDevice { device, wire: wire.span, unit: unit.span });
     }
     devices
 }
@@ -314,22 +357,22 @@ fn profile(table: &Table<'_, '_>, key: &str, findings: &mut Collector<'_>) -> Op
 fn wire(
     table: &Table<'_, '_>,
     key: &str,
-    wires: &[(String, Option<SiteWire>)],
+    wires: &[PlacedWire],
     findings: &mut Collector<'_>,
-) -> Option<usize> {
+) -> Option<At<usize>> {
     let text = table.string(key, findings)?;
-    let index = wires.iter().position(|wire| wire.0 == text.value);
-    if index.is_none() {
+    let Some(index) = wires.iter().position(|wire| wire.id == text.value) else {
         let help = match wires {
             [] => format!("define it: [[wires]] with id = \"{}\" and its endpoint", text.value),
             _ => {
-                let known: Vec<&str> = wires.iter().map(|wire| wire.0.as_str()).collect();
+                let known: Vec<&str> = wires.iter().map(|wire| wire.id.as_str()).collect();
                 format!("write one of: {}; or define it with [[wires]]", known.join(", "))
             }
         };
         findings.add(text.span, format!("the wire `{}` is not defined", text.value), help);
-    }
-    index
+        return None;
+    };
+    Some(At { value: index, span: text.span })
 }
 
 fn unit(

@@ -1,13 +1,22 @@
 //! The wires of a site: opened, and shown as the API has them.
 
+mod plan;
+
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use busbar_link::{Endpoint, Link, OpenError, Options, Priority, Statistics, WireState};
+use busbar_link::{
+    Endpoint, Latency, Link, OpenError, Options, Priority, Statistics, UnitState, UnitStatistics, WireState,
+};
 use busbar_profile::Profile;
 use busbar_profile::plan::Cost;
 
-use crate::api::types::{self, ExceptionCount, WireStatistics, WireView};
-use crate::site::{Site, SiteWire};
+use crate::api::types::{
+    self, ExceptionCount, LatencyBucket, LatencyView, UnitView, WireDetailView, WireStatistics, WireTime,
+    WireView,
+};
+use crate::poll_plan::Overview;
+use crate::site::{Site, SiteDevice, SiteWire};
 
 /// Opens a wire for the devices of the site that are on it.
 pub(crate) fn open(site: &Site, index: usize, wire: &SiteWire) -> Result<Link, OpenError> {
@@ -22,11 +31,8 @@ fn options(wire: &SiteWire, profiles: &[&Profile]) -> Options {
     let defaults = Options::default();
     Options {
         timeout: wire.timeout.or(longest.map(ms)).unwrap_or(defaults.timeout),
-        // Where there are several, the pauses of one are for the others to use: its poller keeps them.
-        spacing: match profiles {
-            [alone] => spacing(alone),
-            _ => defaults.spacing,
-        },
+        // The pauses of a device are for the others on the wire to use: they are kept by unit.
+        spacing: wire.spacing.unwrap_or(defaults.spacing),
         // Every device has one read waiting at most.
         queue: defaults.queue.max(profiles.len() + 16),
         ..defaults
@@ -45,14 +51,20 @@ pub(crate) fn for_polling(link: &Link) -> Link {
 
 /// What a read costs on a wire, for the planner.
 pub(crate) fn cost(endpoint: &Endpoint, profile: &Profile) -> Cost {
-    let cost = match endpoint {
-        Endpoint::Rtu { serial, .. } => {
-            Cost::rtu(serial.baud, u32::from(serial.bits_per_character()), profile.wire.answer_delay())
-        }
-        // A request is a round trip; the bytes hardly count.
-        _ => Cost::tcp(ms(5), 1_000_000),
-    };
+    // Over TCP a request is a round trip; the bytes hardly count.
+    let cost = line_cost(endpoint, profile).unwrap_or(Cost::tcp(ms(5), 1_000_000));
     cost.spaced(spacing(profile))
+}
+
+/// What a read takes of the time of a line whose speed is known.
+pub(crate) fn line_cost(endpoint: &Endpoint, profile: &Profile) -> Option<Cost> {
+    match endpoint {
+        Endpoint::Rtu { serial, .. } => {
+            let bits = u32::from(serial.bits_per_character());
+            Some(Cost::rtu(serial.baud, bits, profile.wire.answer_delay()))
+        }
+        _ => None,
+    }
 }
 
 /// A wire as the API shows it.
@@ -72,12 +84,12 @@ pub(crate) fn view(id: &str, link: &Link) -> WireView {
 }
 
 fn statistics(counted: &Statistics) -> WireStatistics {
-    let exceptions = counted.exceptions.iter();
     WireStatistics {
         requests: counted.requests,
         answers: counted.answers,
         timeouts: counted.timeouts,
-        exceptions: exceptions.map(|(code, count)| ExceptionCount { code: *code, count: *count }).collect(),
+        retries: counted.retries,
+        exceptions: exceptions(&counted.exceptions),
         late: counted.late,
         wrong_unit: counted.wrong_unit,
         wrong_function: counted.wrong_function,
@@ -86,11 +98,106 @@ fn statistics(counted: &Statistics) -> WireStatistics {
         wrong_protocol: counted.wrong_protocol,
         crc_errors: counted.crc_errors,
         garbage: counted.garbage_bytes,
+        echoes: counted.echoes,
+        held: counted.held,
         reconnects: counted.reconnects,
         bytes_in: counted.bytes_received,
         bytes_out: counted.bytes_sent,
-        latency_ms: counted.latency.mean().map(|mean| mean.as_micros() as f64 / 1_000.0),
+        latency_ms: counted.latency.mean().map(in_ms),
     }
+}
+
+/// A wire in detail, with the plans of the devices on it.
+pub(crate) fn detail(id: &str, link: &Link, devices: &[(SiteDevice, Overview)]) -> WireDetailView {
+    let counted = link.statistics();
+    WireDetailView {
+        wire: view(id, link),
+        latency: latency(&counted.latency),
+        open_s: rounded(counted.open_for.as_secs_f64()),
+        time: time(link.endpoint(), counted.open_for, counted.busy, counted.waiting),
+        units: counted
+            .units
+            .iter()
+            .map(|unit| self::unit(link.endpoint(), &counted, unit, devices))
+            .collect(),
+        plans: devices.iter().map(|(device, plan)| plan::view(link.endpoint(), device, plan)).collect(),
+    }
+}
+
+fn unit(
+    endpoint: &Endpoint,
+    wire: &Statistics,
+    counted: &UnitStatistics,
+    devices: &[(SiteDevice, Overview)],
+) -> UnitView {
+    let device = devices.iter().find(|(device, _)| device.unit == counted.unit);
+    let (state, next_probe) = match counted.state {
+        UnitState::Answering => (types::UnitState::Answering, None),
+        UnitState::Missing => (types::UnitState::Missing, None),
+        UnitState::Silent { next_probe } => (types::UnitState::Silent, Some(next_probe)),
+        _ => (types::UnitState::Unknown, None),
+    };
+    UnitView {
+        unit: counted.unit,
+        device: device.map(|(device, _)| device.id.clone()),
+        state,
+        next_probe_s: next_probe.map(|next_probe| next_probe.as_secs_f64()),
+        requests: counted.requests,
+        answers: counted.answers,
+        timeouts: counted.timeouts,
+        retries: counted.retries,
+        held: counted.held,
+        exceptions: exceptions(&counted.exceptions),
+        late: counted.late,
+        crc_errors: counted.crc_errors,
+        garbage: counted.garbage_bytes,
+        bytes_in: counted.bytes_received,
+        bytes_out: counted.bytes_sent,
+        latency: latency(&counted.latency),
+        time: time(endpoint, wire.open_for, counted.busy, counted.waiting),
+    }
+}
+
+/// How much of the time that a wire has been open was used, and how.
+fn time(endpoint: &Endpoint, open_for: Duration, busy: Duration, waiting: Duration) -> WireTime {
+    let share = |part: Duration| match open_for.as_secs_f64() {
+        open if open > 0.0 => rounded(part.as_secs_f64() / open).min(1.0),
+        _ => 0.0,
+    };
+    // Only of a line of our own is the speed known.
+    let busy = matches!(endpoint, Endpoint::Rtu { .. }).then_some(busy);
+    WireTime {
+        busy_s: busy.map(|busy| rounded(busy.as_secs_f64())),
+        waiting_s: rounded(waiting.as_secs_f64()),
+        busy_share: busy.map(share),
+        waiting_share: share(waiting),
+    }
+}
+
+/// To four decimals.
+fn rounded(number: f64) -> f64 {
+    (number * 10_000.0).round() / 10_000.0
+}
+
+fn latency(counted: &Latency) -> LatencyView {
+    LatencyView {
+        count: counted.count(),
+        min_ms: counted.min().map(in_ms),
+        mean_ms: counted.mean().map(in_ms),
+        max_ms: counted.max().map(in_ms),
+        buckets: counted
+            .histogram()
+            .map(|(bound, count)| LatencyBucket { up_to_ms: bound.map(in_ms), count })
+            .collect(),
+    }
+}
+
+fn exceptions(counted: &BTreeMap<u8, u64>) -> Vec<ExceptionCount> {
+    counted.iter().map(|(code, count)| ExceptionCount { code: *code, count: *count }).collect()
+}
+
+fn in_ms(duration: Duration) -> f64 {
+    duration.as_micros() as f64 / 1_000.0
 }
 
 fn ms(ms: u32) -> Duration {
@@ -107,14 +214,30 @@ mod tests {
 
     fn wire() -> SiteWire {
         let endpoint = "tcp://192.0.2.7:502".parse().unwrap();
-        SiteWire { id: "w1".to_owned(), endpoint, timeout: None }
+        SiteWire { id: "w1".to_owned(), endpoint, timeout: None, spacing: None }
     }
 
     #[test]
-    fn a_wire_has_the_pace_of_the_one_device_on_it() {
+    fn a_wire_has_its_own_pause_and_the_longest_time_out_of_its_devices() {
         let datakom = busbar_profile::builtin("datakom-d").unwrap();
-        assert_eq!(options(&wire(), &[smartgen()]).spacing, ms(500));
-        assert_eq!(options(&wire(), &[smartgen(), datakom]).spacing, Duration::ZERO);
+        let hat = busbar_profile::builtin("smartgen-hat821si").unwrap();
+        let plain = options(&wire(), &[smartgen(), hat, datakom]);
+        assert_eq!((plain.spacing, plain.timeout), (Duration::ZERO, ms(1_500)));
+        let slow = SiteWire { spacing: Some(ms(20)), timeout: Some(ms(300)), ..wire() };
+        let set = options(&slow, &[hat]);
+        assert_eq!((set.spacing, set.timeout), (ms(20), ms(300)));
+    }
+
+    #[test]
+    fn the_time_of_a_line_is_shared_out_and_that_of_tcp_is_not_claimed() {
+        let line: Endpoint = "rtu:///dev/a".parse().unwrap();
+        let used = time(&line, ms(10_000), ms(2_500), ms(400));
+        assert_eq!((used.busy_s, used.busy_share), (Some(2.5), Some(0.25)));
+        assert_eq!((used.waiting_s, used.waiting_share), (0.4, 0.04));
+        let tcp = time(&wire().endpoint, ms(10_000), Duration::ZERO, ms(400));
+        assert_eq!((tcp.busy_s, tcp.busy_share, tcp.waiting_share), (None, None, 0.04));
+        let fresh = time(&line, Duration::ZERO, Duration::ZERO, Duration::ZERO);
+        assert_eq!((fresh.busy_share, fresh.waiting_share), (Some(0.0), 0.0));
     }
 
     #[test]

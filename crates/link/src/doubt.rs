@@ -6,6 +6,7 @@
 use std::time::Duration;
 
 use busbar_modbus::Stray;
+use busbar_modbus::client::DEFAULT_QUIET;
 
 use crate::job::Question;
 
@@ -23,6 +24,8 @@ struct Doubt {
     open: u8,
     /// Something else waits for this to be over.
     contended: bool,
+    /// An answer that comes before this may be a copy of the one before it.
+    copies_until: Duration,
 }
 
 impl Doubts {
@@ -34,7 +37,13 @@ impl Doubts {
                 doubt.open = doubt.open.saturating_add(1);
                 doubt.until = doubt.until.max(until);
             }
-            None => self.0.push(Doubt { question, until, open: 1, contended: false }),
+            None => self.0.push(Doubt {
+                question,
+                until,
+                open: 1,
+                contended: false,
+                copies_until: Duration::ZERO,
+            }),
         }
     }
 
@@ -43,18 +52,22 @@ impl Doubts {
     pub(crate) fn answered(&mut self, now: Duration, question: &Question, until: Duration) {
         for doubt in self.0.iter_mut().filter(|doubt| doubt.until > now && doubt.question == *question) {
             doubt.until = doubt.until.max(until);
+            doubt.copies_until = now + DEFAULT_QUIET;
         }
     }
 
-    /// A frame came that answered nothing under way.
-    pub(crate) fn seen(&mut self, stray: &Stray) {
+    /// A frame came that answered nothing under way. What comes close behind an answer is not counted: it may be the
+    /// same one again.
+    pub(crate) fn seen(&mut self, now: Duration, stray: &Stray) {
         let mut alike =
             self.0.iter_mut().enumerate().filter(|(_, doubt)| doubt.question.may_be_answered_by(stray));
         let (Some((index, doubt)), None) = (alike.next(), alike.next()) else {
             // None, or nobody can say which: then all of them stay.
             return;
         };
-        doubt.open -= 1;
+        let copy = now < doubt.copies_until;
+        doubt.copies_until = now + DEFAULT_QUIET;
+        doubt.open -= u8::from(!copy);
         if doubt.open == 0 {
             self.0.swap_remove(index);
         }
@@ -147,18 +160,20 @@ mod tests {
         let other = read(1, 200, 4);
         doubts.lost(ms(0), read(1, 100, 4), ms(3000));
         doubts.lost(ms(200), read(1, 100, 4), ms(3200));
-        for stray in [answer(1, 4), answer(1, 5), answer(2, 4), Stray { function: 4, ..answer(1, 4) }] {
-            doubts.seen(&stray);
+        for stray in
+            [answer(1, 4), answer(1, 4), answer(1, 5), answer(2, 4), Stray { function: 4, ..answer(1, 4) }]
+        {
+            doubts.seen(ms(290), &stray);
             assert_eq!(doubts.hold(ms(300), &other, false), Some(ms(3200)), "{stray:?}");
         }
-        doubts.seen(&Stray { pdu_len: 2, exception: true, ..answer(1, 0) });
-        assert_eq!(doubts.hold(ms(300), &other, false), None);
-        assert!(!doubts.is_any(ms(300)));
+        doubts.seen(ms(340), &Stray { pdu_len: 2, exception: true, ..answer(1, 0) });
+        assert_eq!(doubts.hold(ms(340), &other, false), None);
+        assert!(!doubts.is_any(ms(340)));
 
         // Two lengths are in doubt: an exception says nothing about which.
         doubts.lost(ms(400), read(1, 100, 4), ms(3000));
         doubts.lost(ms(400), read(1, 100, 5), ms(3000));
-        doubts.seen(&Stray { pdu_len: 2, exception: true, ..answer(1, 0) });
+        doubts.seen(ms(450), &Stray { pdu_len: 2, exception: true, ..answer(1, 0) });
         assert_eq!(doubts.hold(ms(500), &other, false), Some(ms(3000)));
         assert!(doubts.may_refuse(ms(500), &other) && !doubts.may_refuse(ms(500), &read(2, 100, 4)));
     }

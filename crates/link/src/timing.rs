@@ -37,18 +37,22 @@ impl Timing {
 
     /// How long the next request waits: the limit where nothing was measured.
     pub(crate) fn timeout(&self, floor: Duration, limit: Duration) -> Duration {
-        match self.estimate(floor, limit) {
-            Some(estimate) => estimate.saturating_mul(1 << self.doublings).min(limit),
-            None => limit,
+        if !self.measured {
+            return limit;
         }
+        // A steady latency is no promise: half of it at least is left for what may come between.
+        let estimate = self.with_margin((4 * self.deviation).max(self.smoothed / 2));
+        estimate.max(floor).saturating_mul(1 << self.doublings).min(limit)
     }
 
-    /// The same without the doublings; none where nothing was measured.
-    pub(crate) fn estimate(&self, floor: Duration, limit: Duration) -> Option<Duration> {
-        // A steady latency is no promise: half of it at least is left for what may come between.
-        let margin = (4 * self.deviation).max(self.smoothed / 2);
-        let estimate = Duration::from_micros(u64::from(self.smoothed) + u64::from(margin));
-        self.measured.then(|| estimate.max(floor).min(limit))
+    /// How long a probe waits; none where nothing was measured. It can be short: if the answer comes later, that is
+    /// heard too.
+    pub(crate) fn probe(&self, floor: Duration, limit: Duration) -> Option<Duration> {
+        self.measured.then(|| self.with_margin(self.smoothed / 2).max(floor).min(limit))
+    }
+
+    fn with_margin(&self, margin: u32) -> Duration {
+        Duration::from_micros(u64::from(self.smoothed) + u64::from(margin))
     }
 }
 
@@ -73,6 +77,7 @@ mod tests {
         assert_eq!(timeout(&timing), 900);
         timing.measure(ms(1400));
         assert_eq!(timeout(&timing), 1500, "one that is late makes it wait");
+        assert_eq!(timing.probe(floor, limit), Some(ms(1050)), "but not a probe");
         (0..60).for_each(|_| timing.measure(ms(2)));
         assert_eq!(timeout(&timing), 200, "the floor");
 
@@ -80,7 +85,7 @@ mod tests {
             timing.miss();
             assert_eq!(timeout(&timing), doubled);
         }
-        assert_eq!(timing.estimate(floor, limit), Some(ms(200)));
+        assert_eq!(timing.probe(floor, limit), Some(ms(200)));
         timing.measure(ms(2));
         assert_eq!(timeout(&timing), 200);
         (0..60).for_each(|_| timing.measure(Duration::MAX));

@@ -43,9 +43,9 @@ impl Units {
         self.0.iter_mut()
     }
 
-    /// How long the slowest unit would be waited for; none where nothing was measured.
+    /// How long a probe of the slowest unit would wait; none where nothing was measured.
     pub(crate) fn slowest(&self, floor: Duration, limit: Duration) -> Option<Duration> {
-        self.0.iter().filter_map(|unit| unit.timing.estimate(floor, limit)).max()
+        self.0.iter().filter_map(|unit| unit.timing.probe(floor, limit)).max()
     }
 
     fn find(&self, id: u8) -> Result<usize, usize> {
@@ -72,8 +72,8 @@ pub(crate) struct Unit {
     /// When that ended, and the pause that was wanted after it.
     ended: Duration,
     spacing: Duration,
-    /// When the first request left that has had no answer yet.
-    unanswered_since: Option<Duration>,
+    /// When the last request left that has had no answer.
+    unanswered: Option<Duration>,
     pub(crate) counts: Counts,
 }
 
@@ -107,7 +107,7 @@ impl Unit {
             served: 0,
             ended: Duration::ZERO,
             spacing: Duration::ZERO,
-            unanswered_since: None,
+            unanswered: None,
             counts: Counts::default(),
         }
     }
@@ -137,7 +137,7 @@ impl Unit {
         self.missed = 0;
         self.probes = 0;
         self.next_probe = Duration::ZERO;
-        self.unanswered_since = None;
+        self.unanswered = None;
         if let Some(latency) = latency {
             self.timing.measure(latency);
         }
@@ -148,7 +148,7 @@ impl Unit {
         self.counts.timeouts += 1;
         self.missed = self.missed.saturating_add(1);
         self.timing.miss();
-        self.unanswered_since.get_or_insert(started);
+        self.unanswered = Some(started);
     }
 
     /// It answered after all, too late: it is alive, and slower than was thought.
@@ -157,7 +157,7 @@ impl Unit {
         self.missed = self.missed.min(SILENT_AFTER - 1);
         self.probes = 0;
         self.next_probe = Duration::ZERO;
-        if let Some(since) = self.unanswered_since.take() {
+        if let Some(since) = self.unanswered.take() {
             self.timing.measure(now.saturating_sub(since));
         }
     }
@@ -229,7 +229,7 @@ mod tests {
         assert!(unit.is_silent());
         unit.answered_late(ms(600));
         assert!(!unit.is_silent());
-        assert_eq!(unit.timing.estimate(ms(200), ms(5000)), Some(ms(1800)), "and slow");
+        assert_eq!(unit.timing.timeout(ms(200), ms(5000)), ms(1800), "and slow");
         unit.missed(ms(700));
         assert!(unit.is_silent(), "it has not answered in time");
         unit.answered(None);

@@ -3,6 +3,7 @@
 //! It has no clock and no socket, so every rule is tested as a script. `shared` does what it says and tells it what
 //! happened.
 
+mod connection;
 mod exchange;
 
 use std::sync::Arc;
@@ -13,7 +14,7 @@ use busbar_modbus::{Client, Progress};
 
 use crate::doubt::Doubts;
 use crate::endpoint::Endpoint;
-use crate::error::{Cause, LinkError, Loss, Outage};
+use crate::error::{Cause, LinkError, Loss};
 use crate::job::{Job, Outcome, Priority};
 use crate::line::Line;
 use crate::options::{Backoff, Options};
@@ -23,13 +24,10 @@ use crate::statistics::Statistics;
 use crate::unit::Units;
 use exchange::{Exchange, Sent};
 
+pub(crate) use connection::Phase;
+
 /// Longer waits are cut to this, so that no sum of times overflows.
 const LONGEST_WAIT: Duration = Duration::from_secs(24 * 60 * 60);
-
-/// A connection that drops is made anew at once only if it had lived so long, or had carried so many answers. Every
-/// other drop counts as a failure, so that a peer which hangs up after each answer gets no storm of connections.
-const PROVEN_AGE: Duration = Duration::from_secs(5);
-const PROVEN_ANSWERS: u64 = 100;
 
 /// One wire: what waits, what is under way, and what state the connection is in.
 #[derive(Debug)]
@@ -198,56 +196,6 @@ impl Wire {
     }
 
     // What the task reports.
-
-    /// The connection is made.
-    pub(crate) fn connected(&mut self, now: Duration) {
-        self.client.reset();
-        self.silence.begin();
-        self.unanswered_since = None;
-        self.connections += 1;
-        self.connected_at = now;
-        self.answers = 0;
-        // Behind a new connection things may have changed.
-        self.units.iter_mut().for_each(|unit| unit.next_probe = Duration::ZERO);
-        self.enter(Phase::Connected);
-    }
-
-    /// The attempt to connect failed.
-    pub(crate) fn refused(&mut self, now: Duration, cause: Cause, wakes: &mut Vec<Waker>) {
-        self.failures += 1;
-        self.go_down(now, cause, wakes);
-    }
-
-    /// The connection ended.
-    pub(crate) fn lost(&mut self, now: Duration, cause: Cause, wakes: &mut Vec<Waker>) {
-        if !matches!(self.phase, Phase::Connected) {
-            return;
-        }
-        self.client.reset();
-        if let Some(exchange) = self.exchange.take() {
-            self.drop_exchange(now, &exchange, cause, wakes);
-        }
-        if let Some(place) = self.together.take() {
-            let reason = self.outage(cause);
-            self.queue.finish(place, Err(LinkError::Down { reason }), wakes);
-        }
-        // Peers close idle connections, and that is nothing to report: one attempt at once. Nor is the first short
-        // connection, but the next one has to wait.
-        let proven = self.is_proven(now);
-        if proven {
-            self.failures = 0;
-        }
-        self.failures += 1;
-        if self.failures > 1 {
-            self.go_down(now, cause, wakes);
-            return;
-        }
-        let since = match proven {
-            true => now,
-            false => self.next_attempt(now),
-        };
-        self.enter(Phase::Connecting { trying: false, since });
-    }
 
     /// RTU: so many bytes were on the line, whatever they are, and how long the echo of our own request is if they end
     /// one. The line has to be silent after them.
@@ -438,65 +386,6 @@ impl Wire {
             }
         }
     }
-
-    /// Whether the connection in use was good for something before it ended. Age alone proves nothing for one that
-    /// left requests without an answer.
-    fn is_proven(&self, now: Duration) -> bool {
-        let answers = self.answers;
-        let is_old = now.saturating_sub(self.connected_at) >= PROVEN_AGE;
-        answers >= PROVEN_ANSWERS || is_old && (answers > 0 || self.silence.timeouts() == 0)
-    }
-
-    /// When to connect again after a failure.
-    fn next_attempt(&self, now: Duration) -> Duration {
-        now + self.rules.backoff.delay(self.failures).min(LONGEST_WAIT)
-    }
-
-    /// Ends the connection by our own choice.
-    fn hang_up(&mut self, now: Duration, cause: Cause, wakes: &mut Vec<Waker>) {
-        self.lost(now, cause, wakes);
-        self.hang_up = true;
-    }
-
-    fn go_down(&mut self, now: Duration, cause: Cause, wakes: &mut Vec<Waker>) {
-        let reason = self.outage(cause);
-        self.queue.fail_waiting(
-            |_| {
-                let reason = reason.clone();
-                Some(LinkError::Down { reason })
-            },
-            wakes,
-        );
-        self.enter(Phase::Down { retry_at: self.next_attempt(now), trying: false, reason });
-    }
-
-    /// While a connection is being made a request waits as long as it would wait for an answer.
-    fn expire_waiting(&mut self, now: Duration, since: Duration, wakes: &mut Vec<Waker>) -> Step {
-        let until = |entry: &Entry| entry.since.max(since) + entry.job.timeout;
-        let endpoint = &self.endpoint;
-        self.queue.fail_waiting(
-            |entry| {
-                let after = entry.job.timeout;
-                (until(entry) <= now).then(|| LinkError::Down {
-                    reason: Outage {
-                        endpoint: Arc::clone(endpoint),
-                        cause: Cause::StillConnecting { after },
-                    },
-                })
-            },
-            wakes,
-        );
-        Step::Wait(self.queue.waiting().map(until).min())
-    }
-
-    fn enter(&mut self, phase: Phase) {
-        self.phase = phase;
-        self.news = true;
-    }
-
-    fn outage(&self, cause: Cause) -> Outage {
-        Outage { endpoint: Arc::clone(&self.endpoint), cause }
-    }
 }
 
 /// What the task has to do next.
@@ -522,17 +411,6 @@ impl Step {
             Self::Connect | Self::Disconnect | Self::End => None,
         }
     }
-}
-
-/// The state of the connection.
-#[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Phase {
-    /// Being made for the first time, or soon after it dropped: requests wait. It begins at `since`.
-    Connecting { trying: bool, since: Duration },
-    /// Up.
-    Connected,
-    /// It failed and is tried again later: requests fail at once.
-    Down { retry_at: Duration, trying: bool, reason: Outage },
 }
 
 /// What became of an attempt to start an exchange.
@@ -561,6 +439,8 @@ fn silent(now: Duration, unit: u8, next_probe: Duration) -> LinkError {
 }
 
 #[cfg(test)]
+mod lateness;
+#[cfg(test)]
 mod pace;
 #[cfg(test)]
 mod promises;
@@ -568,6 +448,10 @@ mod promises;
 mod rtu;
 #[cfg(test)]
 mod script;
+#[cfg(test)]
+mod sim;
+#[cfg(test)]
+mod sweep;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

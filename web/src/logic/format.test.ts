@@ -5,6 +5,7 @@ import {
   countdownText,
   decimalsOf,
   durationText,
+  hoursText,
   numberText,
   registersText,
   timeOf,
@@ -92,4 +93,15 @@ test('registers are four hex digits each', () =>
 test('a missing or unreadable time is none', () => {
   expect([null, undefined, '', 'soon'].map(timeOf)).toEqual([undefined, undefined, undefined, undefined])
   expect(timeOf('2026-11-23T04:00:00.250Z')).toBe(Date.UTC(2026, 10, 23, 4, 0, 0, 250))
+})
+
+test.each([
+  [1234.5083, '1234 h 30 min 30 s', '1234 h 30 min'],
+  [0.0003, '0 h 00 min 01 s', '0 h 00 min'],
+  [0.0111, '0 h 00 min 40 s', '0 h 00 min'],
+  [65535.9997, '65535 h 59 min 59 s', '65535 h 59 min'],
+  [-1.5, '-1 h 30 min 00 s', '-1 h 30 min'],
+])('%d hours are %s', (hours, whole, brief) => {
+  expect(hoursText(hours)).toBe(whole)
+  expect(hoursText(hours, true)).toBe(brief)
 })

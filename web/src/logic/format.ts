@@ -62,6 +62,15 @@ export function countdownText(seconds: number): string {
   return `${Math.floor(minutes / 60)}:${pad(minutes % 60)}:${pad(whole % 60)} h`
 }
 
+/** A number of hours as a counter has it: `1234 h 30 min`, with the seconds unless it is to be brief. */
+export function hoursText(hours: number, brief = false): string {
+  // Hours come to four decimals, so that the second they stand for is certain.
+  const seconds = Math.round(Math.abs(hours) * 3600)
+  const minutes = Math.floor(seconds / 60)
+  const text = `${hours < 0 ? '-' : ''}${Math.floor(minutes / 60)} h ${pad(minutes % 60)} min`
+  return brief ? text : `${text} ${pad(seconds % 60)} s`
+}
+
 /** Time of day in the reader's zone, with the date in front unless it is today. */
 export function clockText(time: number, now: number): string {
   const at = new Date(time)

@@ -15,7 +15,7 @@ export interface Standing {
  * Without a live connection nobody knows whether it is still good: it counts as stale.
  */
 export function standing(
-  view: ValueView | undefined,
+  view: Pick<ValueView, 'quality' | 'ts'> | undefined,
   round: number | undefined,
   now: number,
   live: boolean,

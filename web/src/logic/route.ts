@@ -1,13 +1,20 @@
 // Which view the address names. The part after # stays in the browser, so a path prefix of a proxy never matters.
 
 export interface Route {
-  view: 'device'
+  view: 'device' | 'wires'
   device: string | undefined
+  wire: string | undefined
 }
 
 export function parseRoute(hash: string): Route {
-  const [, view, id] = /^#\/([a-z]+)\/([^/]+)$/.exec(hash) ?? []
-  return { view: 'device', device: view === 'devices' && id ? decoded(id) : undefined }
+  const [, view, rest] = /^#\/([a-z]+)(?:\/([^/]+))?$/.exec(hash) ?? []
+  const id = rest ? decoded(rest) : undefined
+  if (view === 'wires') return { view: 'wires', device: undefined, wire: id }
+  return { view: 'device', device: view === 'devices' ? id : undefined, wire: undefined }
+}
+
+export function wireLink(id?: string): string {
+  return id === undefined ? '#/wires' : `#/wires/${encodeURIComponent(id)}`
 }
 
 export function deviceLink(id: string): string {

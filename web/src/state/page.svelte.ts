@@ -47,7 +47,9 @@ export class Page {
     while (!signal.aborted && !device.groups) {
       try {
         const path = `devices/${encodeURIComponent(device.view.id)}/points`
-        device.groups = ((await this.#fetch(path, signal)) as PointsView).groups
+        const points = (await this.get(path, signal)) as PointsView
+        device.joined = points.joined
+        device.groups = points.groups
       } catch {
         // The stream's banner tells about a lost gateway; here it only takes longer.
         await new Promise((resolve) => setTimeout(resolve, RETRY_MS))
@@ -55,7 +57,8 @@ export class Page {
     }
   }
 
-  async #fetch(path: string, signal: AbortSignal): Promise<unknown> {
+  /** What the API has at `path`. */
+  async get(path: string, signal: AbortSignal): Promise<unknown> {
     const asked = Date.now()
     const answer = await fetch(new URL(path, this.#api), { signal, headers: { accept: 'application/json' } })
     this.clock.compare(answer.headers.get('date'), asked, Date.now())

@@ -6,6 +6,8 @@ import type {
   AlarmView,
   DeviceView,
   GroupView,
+  JoinedPointView,
+  JoinedView,
   Rate,
   SiteInfo,
   Snapshot,
@@ -34,6 +36,10 @@ export class Device {
   alarms = $state.raw<readonly AlarmView[]>([])
   /** What the points are; undefined until it has been fetched. */
   groups = $state.raw<readonly GroupView[]>()
+  /** What several points make up, fetched with the points. */
+  joined = $state.raw<readonly JoinedPointView[]>([])
+  /** What they make up now, by signal. */
+  whole = $state<Record<string, JoinedView>>({})
   /** When the last round of each rate was read. */
   rounds = $state<Partial<Record<Rate, number>>>({})
   /** Which groups (`group/…`) and lines (`point/…`) were opened or closed here; kept when the layout changes. */
@@ -58,11 +64,21 @@ export class Device {
   }
 
   /** Everything the gateway knows of the values, after a gap in the stream. */
-  reset(view: DeviceView, values: readonly ValueView[], alarms: readonly AlarmView[]): void {
+  reset(
+    view: DeviceView,
+    values: readonly ValueView[],
+    joined: readonly JoinedView[],
+    alarms: readonly AlarmView[],
+  ): void {
     this.view = view
     this.alarms = alarms
     this.rounds = {}
+    this.take(values, joined)
+  }
+
+  take(values: readonly ValueView[], joined: readonly JoinedView[]): void {
     for (const value of values) this.cell(value.id).set(value)
+    for (const value of joined) this.whole[value.signal] = value
   }
 }
 
@@ -93,11 +109,12 @@ export class Site {
     // A gateway that was started again may have other points under the same names.
     const restarted = this.view !== undefined && this.view.started !== site.started
     const before = this.devices.flatMap((device) => device.alarms)
-    this.devices = devices.map(({ device: view, values }) => {
+    this.devices = devices.map(({ device: view, values, joined }) => {
       const device = (restarted ? undefined : this.device(view.id)) ?? new Device(view)
       device.reset(
         view,
         values,
+        joined,
         alarms.filter((alarm) => alarm.device === view.id),
       )
       return device
@@ -106,12 +123,12 @@ export class Site {
     this.#speak(announcement(before, alarms))
   }
 
-  #values({ device: id, rate, ts, changed }: ValuesEvent): void {
+  #values({ device: id, rate, ts, changed, joined }: ValuesEvent): void {
     const device = this.device(id)
     if (!device) return
     const read = timeOf(ts)
     if (read !== undefined) device.rounds[rate] = read
-    for (const value of changed) device.cell(value.id).set(value)
+    device.take(changed, joined)
   }
 
   #device(view: DeviceView): void {

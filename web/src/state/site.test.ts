@@ -32,7 +32,7 @@ describe('a snapshot', () => {
     const site = started()
     const gen1 = site.device('gen1')!
     gen1.groups = [group('G', [point('volts')])]
-    site.apply('values', { device: 'gen1', rate: 'fast', ts: stamp(9), changed: [] })
+    site.apply('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(9), changed: [] })
     site.apply('snapshot', snapshot([{ device: device('gen1'), values: [value('volts', 231)] }]))
     expect(site.devices).toEqual([gen1])
     expect(gen1.groups).toHaveLength(1)
@@ -54,7 +54,13 @@ describe('a snapshot', () => {
 describe('values', () => {
   test('change what they name and date the round', () => {
     const site = started()
-    site.apply('values', { device: 'gen1', rate: 'fast', ts: stamp(3), changed: [value('volts', 229.9)] })
+    site.apply('values', {
+      device: 'gen1',
+      joined: [],
+      rate: 'fast',
+      ts: stamp(3),
+      changed: [value('volts', 229.9)],
+    })
     const gen1 = site.device('gen1')!
     expect(gen1.cell('volts').view?.value).toBe(229.9)
     expect(gen1.cell('amps').view?.value).toBe(12)
@@ -67,7 +73,7 @@ describe('values', () => {
     const site = started()
     const gen1 = site.device('gen1')!
     site.apply('device', device('gen1', { online: false, last_seen: stamp(2) }))
-    site.apply('values', { device: 'gen1', rate: 'fast', ts: stamp(30), changed: [] })
+    site.apply('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(30), changed: [] })
     expect(gen1.seenAt).toBe(START + 2000)
     site.apply('device', device('gen1', { online: false, last_seen: null }))
     expect(gen1.seenAt).toBeUndefined()
@@ -76,14 +82,26 @@ describe('values', () => {
   test('age with the round of their own rate', () => {
     const site = started()
     const gen1 = site.device('gen1')!
-    site.apply('values', { device: 'gen1', rate: 'slow', ts: stamp(3), changed: [value('flow', 21.4)] })
-    site.apply('values', { device: 'gen1', rate: 'fast', ts: stamp(9), changed: [] })
+    site.apply('values', {
+      device: 'gen1',
+      joined: [],
+      rate: 'slow',
+      ts: stamp(3),
+      changed: [value('flow', 21.4)],
+    })
+    site.apply('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(9), changed: [] })
     expect(gen1.rounds).toEqual({ slow: START + 3000, fast: START + 9000 })
   })
 
   test('of an unknown device change nothing', () => {
     const site = started()
-    site.apply('values', { device: 'gen9', rate: 'fast', ts: stamp(3), changed: [value('volts', 1)] })
+    site.apply('values', {
+      device: 'gen9',
+      joined: [],
+      rate: 'fast',
+      ts: stamp(3),
+      changed: [value('volts', 1)],
+    })
     expect(site.devices).toHaveLength(2)
   })
 

@@ -2,8 +2,8 @@
 import { flushSync, mount, unmount } from 'svelte'
 import { afterEach, beforeEach, expect, test, vi } from 'vitest'
 import App from '../App.svelte'
-import { alarm, device, group, point, snapshot, stamp, START, value } from '../logic/samples'
-import type { GroupView, Snapshot } from '../logic/types'
+import { alarm, device, group, joined, point, snapshot, stamp, START, value } from '../logic/samples'
+import type { GroupView, JoinedPointView, Snapshot } from '../logic/types'
 import { Page } from '../state/page.svelte'
 
 const VOLTS = point('volts', {
@@ -28,6 +28,7 @@ let emit: (type: string, data?: unknown) => void
 let page: Page
 let app: Record<string, unknown>
 let groups: GroupView[]
+let whole: JoinedPointView[]
 
 async function show(first: Snapshot): Promise<void> {
   const listeners = new Map<string, (event: { data?: unknown }) => void>()
@@ -35,7 +36,7 @@ async function show(first: Snapshot): Promise<void> {
     listeners.get(type)?.({ data: JSON.stringify(data) })
     flushSync()
   }
-  vi.stubGlobal('fetch', async () => Response.json({ groups }))
+  vi.stubGlobal('fetch', async () => Response.json({ groups, joined: whole }))
   page = new Page(() => ({
     addEventListener: (type, act) => listeners.set(type, act),
     close: () => undefined,
@@ -53,6 +54,7 @@ const text = (element: Element | null) => element?.textContent?.replace(/\s+/g, 
 beforeEach(() => {
   vi.useFakeTimers({ now: START + 2000, toFake: ['Date', 'setTimeout', 'clearTimeout'] })
   groups = [group('Genset', [VOLTS, FLAGS])]
+  whole = []
 })
 
 afterEach(async () => {
@@ -71,7 +73,7 @@ test('a good value stands as it came, with unit and age, and ages each second', 
   vi.advanceTimersByTime(3000)
   flushSync()
   expect(text(line('volts').querySelector('.age'))).toBe('good, 5 s')
-  emit('values', { device: 'gen1', rate: 'fast', ts: stamp(5), changed: [] })
+  emit('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(5), changed: [] })
   expect(text(line('volts').querySelector('.age'))).toBe('good, 0 s')
 })
 
@@ -123,7 +125,13 @@ test('address and number come on request, by a button', async () => {
 test('a bit array shows the labels of the bits that are set', async () => {
   await show(snapshot([{ device: device('gen1'), values: [value('flags', ['Horn'], { set: [1] })] }]))
   expect(text(line('flags').querySelector('.values'))).toBe('Horn')
-  emit('values', { device: 'gen1', rate: 'fast', ts: stamp(3), changed: [value('flags', [], { set: [] })] })
+  emit('values', {
+    device: 'gen1',
+    joined: [],
+    rate: 'fast',
+    ts: stamp(3),
+    changed: [value('flags', [], { set: [] })],
+  })
   expect(text(line('flags').querySelector('.values'))).toBe('none set')
 })
 
@@ -170,11 +178,56 @@ test('a device that does not answer says so in its own sentence', async () => {
 test('the countdown runs between two rounds and stands still with the device', async () => {
   const state = { code: 5, label: 'Cranking', canonical: 'cranking', timer_s: 67 }
   await show(snapshot([{ device: device('gen1', { state }), values: [] }]))
-  emit('values', { device: 'gen1', rate: 'fast', ts: stamp(2), changed: [] })
+  emit('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(2), changed: [] })
   expect(text(document.querySelector('.summary'))).toContain('1:07 min')
   vi.advanceTimersByTime(2000)
   flushSync()
   expect(text(document.querySelector('.summary'))).toContain('1:05 min')
-  emit('values', { device: 'gen1', rate: 'fast', ts: stamp(4), changed: [] })
+  emit('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(4), changed: [] })
   expect(text(document.querySelector('.summary'))).toContain('1:07 min')
+})
+
+test('hours out of several points stand at a glance and in full', async () => {
+  whole = [joined('engine.hours', { meaning: 'Hours the engine has run' }), joined('clock', { unit: null })]
+  const hours = {
+    signal: 'engine.hours',
+    value: 1234.5083,
+    unit: 'h',
+    quality: 'good',
+    ts: stamp(0),
+  } as const
+  const clock = {
+    signal: 'clock',
+    value: '2026-11-23T07:30:59',
+    unit: null,
+    quality: 'good',
+    ts: stamp(0),
+  } as const
+  const air1 = device('air1', { kind: 'compressor', profile: 'smartgen-acc1700' })
+  await show(snapshot([{ device: air1, values: [value('volts', 1)], joined: [hours, clock] }]))
+  expect(text(document.querySelector('[aria-label="At a glance"]'))).toBe('Engine hours 1234 h 30 min')
+  expect(document.body.textContent).toContain('Hours the engine has run')
+  expect(document.body.textContent).toContain('1234 h 30 min 30 s')
+  expect(document.body.textContent).toContain('2026-11-23 07:30:59')
+  const later = { ...hours, value: 1234.5167 }
+  emit('values', { device: 'air1', joined: [later], rate: 'slow', ts: stamp(10), changed: [] })
+  expect(document.body.textContent).toContain('1234 h 31 min 00 s')
+  const bad = { ...later, quality: 'bad' }
+  emit('values', { device: 'air1', joined: [bad], rate: 'slow', ts: stamp(20), changed: [] })
+  expect(text(document.querySelector('[aria-label="At a glance"] .struck'))).toBe('1234 h 31 min')
+})
+
+test('a switch stands as its flag says', async () => {
+  const position = point('position', {
+    type: 'bits',
+    bits: [{ bit: 4, id: 's1', label: 'S1 closed', class: 'status', signal: 'breaker.src1.closed' }],
+  })
+  groups = [group('Switch', [VOLTS, position])]
+  const ats = device('ats1', { kind: 'transfer_switch' })
+  await show(snapshot([{ device: ats, values: [value('position', ['S1 closed'], { set: [4] })] }]))
+  const glance = () => text(document.querySelector('[aria-label="At a glance"]'))
+  expect(glance()).toBe('Source 1 switch closed')
+  const open = value('position', [], { set: [] })
+  emit('values', { device: 'ats1', joined: [], rate: 'fast', ts: stamp(3), changed: [open] })
+  expect(glance()).toBe('Source 1 switch open')
 })

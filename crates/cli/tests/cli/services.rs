@@ -226,6 +226,17 @@ fn a_missing_site_file_is_one_sentence() {
 }
 
 #[test]
+fn a_site_file_of_other_bytes_is_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("site.toml");
+    std::fs::write(&file, b"[site]\nname = \"T\xFF\"\n").unwrap();
+    call(["run", "--config", file.to_str().unwrap()])
+        .fails()
+        .prints("")
+        .says_in_one_sentence("site.toml is not UTF-8 text: line 2 has other bytes; save it as UTF-8");
+}
+
+#[test]
 fn the_sample_site_file_is_right() {
     let sample = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/site.toml");
     let (_taken, port) = free_port();

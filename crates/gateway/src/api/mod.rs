@@ -17,7 +17,8 @@ use utoipa_axum::routes;
 
 pub use self::problem::Problem;
 use self::types::{
-    AlarmView, AlarmsEvent, DeviceView, PointsView, SiteView, SnapshotEvent, ValueView, ValuesEvent, WireView,
+    AlarmView, AlarmsEvent, DeviceView, JoinedView, PointsView, SiteView, SnapshotEvent, ValueView,
+    ValuesEvent, WireDetailView, WireView,
 };
 use crate::events;
 use crate::hub::Hub;
@@ -39,8 +40,10 @@ fn routes() -> OpenApiRouter<Arc<Hub>> {
         .routes(routes!(device))
         .routes(routes!(points))
         .routes(routes!(values))
+        .routes(routes!(joined))
         .routes(routes!(alarms))
         .routes(routes!(wires))
+        .routes(routes!(wire))
         .routes(routes!(stream))
         .routes(routes!(document))
         .routes(routes!(healthz))
@@ -137,6 +140,26 @@ async fn values(
     hub.values(&known(device)?, &query).map(Json)
 }
 
+/// The signals of one device that several points make up: hours out of hours, minutes and seconds, a clock out of its
+/// parts.
+///
+/// A signal that one point carries is named in that point's description.
+#[utoipa::path(
+    get, path = "/api/v1/devices/{device}/joined", tag = "live",
+    params(("device" = String, Path, description = "Id of the device", example = "air1")),
+    responses(
+        (status = OK, body = Vec<JoinedView>, description = "Its joined signals"),
+        (status = BAD_REQUEST, body = Problem, content_type = "application/problem+json", description = "The id is no text"),
+        (status = NOT_FOUND, body = Problem, content_type = "application/problem+json", description = "There is no such device"),
+    ),
+)]
+async fn joined(
+    State(hub): State<Arc<Hub>>,
+    device: Result<Path<String>, PathRejection>,
+) -> Result<Json<Vec<JoinedView>>, Problem> {
+    hub.joined(&known(device)?).map(Json)
+}
+
 /// The active alarms of every device, the gravest first.
 #[utoipa::path(get, path = "/api/v1/alarms", tag = "live", responses((status = OK, body = Vec<AlarmView>, description = "The active alarms")))]
 async fn alarms(State(hub): State<Arc<Hub>>) -> Json<Vec<AlarmView>> {
@@ -147,6 +170,23 @@ async fn alarms(State(hub): State<Arc<Hub>>) -> Json<Vec<AlarmView>> {
 #[utoipa::path(get, path = "/api/v1/wires", tag = "site", responses((status = OK, body = Vec<WireView>, description = "The wires")))]
 async fn wires(State(hub): State<Arc<Hub>>) -> Json<Vec<WireView>> {
     Json(hub.wires())
+}
+
+/// One wire in detail: its units, how long answers took, how its time is used, and the reads of each device on it.
+#[utoipa::path(
+    get, path = "/api/v1/wires/{wire}", tag = "site",
+    params(("wire" = String, Path, description = "Id of the wire", example = "gen1")),
+    responses(
+        (status = OK, body = WireDetailView, description = "The wire"),
+        (status = BAD_REQUEST, body = Problem, content_type = "application/problem+json", description = "The id is no text"),
+        (status = NOT_FOUND, body = Problem, content_type = "application/problem+json", description = "There is no such wire"),
+    ),
+)]
+async fn wire(
+    State(hub): State<Arc<Hub>>,
+    wire: Result<Path<String>, PathRejection>,
+) -> Result<Json<WireDetailView>, Problem> {
+    hub.wire(&named(wire, "wire")?).map(Json)
 }
 
 /// Whose events are wanted.
@@ -201,13 +241,19 @@ async fn healthz() -> &'static str {
     "ok\n"
 }
 
-/// The id in a path; one that is no text names no device.
+/// The id of a device in a path.
 fn known(device: Result<Path<String>, PathRejection>) -> Result<String, Problem> {
-    match device {
-        Ok(Path(device)) => Ok(device),
+    named(device, "device")
+}
+
+/// The id in a path; one that is no text names nothing.
+fn named(id: Result<Path<String>, PathRejection>, kind: &str) -> Result<String, Problem> {
+    match id {
+        Ok(Path(id)) => Ok(id),
         Err(_) => {
-            let detail =
-                "the address is no UTF-8 text, so it names no device; /api/v1/devices lists the devices";
+            let detail = format!(
+                "the address is no UTF-8 text, so it names no {kind}; /api/v1/{kind}s lists the {kind}s"
+            );
             Err(Problem::new(StatusCode::BAD_REQUEST, detail))
         }
     }

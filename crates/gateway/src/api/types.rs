@@ -3,6 +3,8 @@
 //! These types are the contract of the API and nothing else: they are built from the live state, sent, and
 //! forgotten. `openapi.json` is generated from them, and the page's own types from that file.
 
+mod wire;
+
 use std::borrow::Cow;
 
 use busbar_profile::{self as profile, Number, Shown};
@@ -10,6 +12,11 @@ use serde::Serialize;
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema, SchemaType, Type};
 use utoipa::openapi::{RefOr, schema};
 use utoipa::{PartialSchema, ToSchema};
+
+pub use self::wire::{
+    ExceptionCount, LatencyBucket, LatencyView, PlanView, PlannedRead, PlannedRound, UnitState, UnitView,
+    WireDetailView, WireState, WireStatistics, WireTime, WireView,
+};
 
 /// The site, without its devices.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -71,7 +78,7 @@ pub struct DeviceView {
     #[schema(
         required,
         examples(
-            "Genset 1 cannot be read: unit 1 did not answer within 1s, asked 2 times: check the unit id and that the device is on"
+            "Genset 1 cannot be read: unit 1 did not answer within 1s, asked 2 times: check the unit id and that the device is on; docs/connect/datakom-d.md says how to set it up and wire it"
         )
     )]
     pub fault: Option<String>,
@@ -151,6 +158,26 @@ pub struct AlarmCounts {
 pub struct PointsView {
     /// The groups in the order of the profile.
     pub groups: Vec<GroupView>,
+    /// What several of its points make up, in the order of the profile.
+    pub joined: Vec<JoinedPointView>,
+}
+
+/// What a joined signal is: one value out of several points, such as hours out of hours, minutes and seconds.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct JoinedPointView {
+    /// Its id in the shared vocabulary.
+    #[schema(examples("engine.hours"))]
+    pub signal: String,
+    /// What it means.
+    #[schema(examples("Hours the engine has run"))]
+    pub meaning: String,
+    /// Its unit; null for a clock.
+    #[schema(required, examples("h"))]
+    pub unit: Option<String>,
+    /// How often its points are read.
+    pub rate: Rate,
+    /// Ids of its points.
+    pub points: Vec<String>,
 }
 
 /// One group of points.
@@ -287,6 +314,10 @@ pub struct BitView {
     /// The class of alarm it is; null when it is none.
     #[schema(required)]
     pub class: Option<Class>,
+    /// Its id in the shared vocabulary.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, examples("breaker.genset.closed"))]
+    pub signal: Option<String>,
 }
 
 /// The class of a bit, the gravest first.
@@ -340,6 +371,24 @@ pub struct ValueView {
     pub raw: Option<Vec<u16>>,
 }
 
+/// What several points of a device make up now.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct JoinedView {
+    /// Its id in the shared vocabulary.
+    #[schema(examples("engine.hours"))]
+    pub signal: String,
+    /// Hours as a number, a clock as local date and time; null when there is none or when its points make none.
+    pub value: PointValue,
+    /// Its unit; null for a clock.
+    #[schema(required, examples("h"))]
+    pub unit: Option<String>,
+    /// As good as the worst of its points.
+    pub quality: Quality,
+    /// When its points were last all read well in one round; null before that.
+    #[schema(required)]
+    pub ts: Option<Time>,
+}
+
 /// How far a value is to be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
@@ -378,89 +427,6 @@ pub struct AlarmView {
     pub since: Time,
 }
 
-/// One wire and how it does.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct WireView {
-    /// Its id in the site file.
-    #[schema(examples("gen1"))]
-    pub id: String,
-    /// Where it leads.
-    #[schema(examples("tcp://192.168.1.20:502"))]
-    pub endpoint: String,
-    /// Whether it is connected.
-    pub state: WireState,
-    /// Why it is down; null otherwise.
-    #[schema(
-        required,
-        examples(
-            "tcp://192.168.1.20:502: connection refused: check the port, and that the device is on and takes Modbus connections"
-        )
-    )]
-    pub reason: Option<String>,
-    /// What went over it since the gateway started.
-    pub statistics: WireStatistics,
-}
-
-/// Whether a wire is connected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum WireState {
-    /// Being connected.
-    Connecting,
-    /// Connected.
-    Connected,
-    /// Not connected; tried again by itself.
-    Down,
-}
-
-/// What went over a wire since the gateway started.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
-pub struct WireStatistics {
-    /// Requests sent, repeats included.
-    pub requests: u64,
-    /// Answers taken, exceptions included.
-    pub answers: u64,
-    /// Requests that nobody answered in time.
-    pub timeouts: u64,
-    /// Exceptions, by code.
-    pub exceptions: Vec<ExceptionCount>,
-    /// Answers that came after their time was up.
-    pub late: u64,
-    /// Answers from another unit than the one that was asked.
-    pub wrong_unit: u64,
-    /// Answers with another function than the request.
-    pub wrong_function: u64,
-    /// Answers with more or less data than was asked for.
-    pub wrong_length: u64,
-    /// Confirmations of another write than was sent.
-    pub wrong_echo: u64,
-    /// Frames of another protocol than Modbus.
-    pub wrong_protocol: u64,
-    /// Frames whose checksum was wrong.
-    pub crc_errors: u64,
-    /// Bytes that belonged to no frame.
-    pub garbage: u64,
-    /// Times the wire was connected again.
-    pub reconnects: u64,
-    /// Bytes received.
-    pub bytes_in: u64,
-    /// Bytes sent.
-    pub bytes_out: u64,
-    /// Mean time from request to answer, in milliseconds; null before the first answer.
-    #[schema(required, examples(3.2))]
-    pub latency_ms: Option<f64>,
-}
-
-/// How often a device answered with one exception code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-pub struct ExceptionCount {
-    /// The code on the wire.
-    #[schema(examples(2))]
-    pub code: u8,
-    /// How often it came.
-    pub count: u64,
-}
-
 /// `event: snapshot`: everything, sent first and again after a reader fell behind.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SnapshotEvent {
@@ -479,6 +445,8 @@ pub struct DeviceSnapshot {
     pub device: DeviceView,
     /// Its values, in address order.
     pub values: Vec<ValueView>,
+    /// What several of its points make up.
+    pub joined: Vec<JoinedView>,
 }
 
 /// `event: values`: a poll round of one device is finished.
@@ -495,6 +463,8 @@ pub struct ValuesEvent {
     pub ts: Time,
     /// The points whose value or quality changed.
     pub changed: Vec<ValueView>,
+    /// The joined signals whose value or quality changed.
+    pub joined: Vec<JoinedView>,
 }
 
 /// `event: alarms`: the active alarms of one device changed.

@@ -185,6 +185,7 @@ fn parse_duration(text: &str) -> Option<Duration> {
 
 fn in_words(duration: Duration) -> String {
     match duration.as_millis() {
+        0 => "0s".to_owned(),
         ms if ms % 3_600_000 == 0 => format!("{}h", ms / 3_600_000),
         ms if ms % 60_000 == 0 => format!("{}min", ms / 60_000),
         ms if ms % 1_000 == 0 => format!("{}s", ms / 1_000),
@@ -230,6 +231,7 @@ mod tests {
         }
         assert_eq!(in_words(Duration::from_millis(1_500)), "1500ms");
         assert_eq!(in_words(Duration::from_secs(60)), "1min");
+        assert_eq!(in_words(Duration::ZERO), "0s");
     }
 
     #[test]

@@ -15,6 +15,11 @@ timeout = "500ms"
 [[wires]]
 id = "bus"
 endpoint = "rtu:///dev/ttyUSB0?baud=19200"
+spacing = "20ms"
+
+[[wires]]
+id = "converter"
+endpoint = "rtu+tcp://192.168.1.30:4001"
 
 [[devices]]
 id = "gen1"
@@ -63,7 +68,9 @@ fn a_whole_site_file() {
     assert_eq!((site.name.as_str(), site.listen.to_string().as_str()), ("North hospital", "[::1]:9090"));
     assert_eq!(site.wires[0].endpoint.to_string(), "tcp://192.168.1.20:502");
     assert_eq!(site.wires[0].timeout, Some(Duration::from_millis(500)));
-    assert_eq!(site.wires[1].timeout, None);
+    assert_eq!((site.wires[1].timeout, site.wires[0].spacing), (None, None));
+    assert_eq!(site.wires[1].spacing, Some(Duration::from_millis(20)));
+    assert!(site.warnings.is_empty());
     let [first, second] = site.devices.as_slice() else { panic!("two devices") };
     assert_eq!((first.name.as_str(), first.wire, first.unit), ("Genset 1", 0, 1));
     assert_eq!(first.word_order, WordOrder::HighFirst);
@@ -150,6 +157,19 @@ fn every_mistake_has_its_place_and_remedy() {
         (
             &with("[[wires]]\nid = \"w\"\nendpoint = \"tcp://h:0\""),
             "site.toml:4:12: `tcp://h:0` cannot be connected to: nothing listens on port 0; write the port of the device",
+        ),
+        (
+            &with("[[wires]]\nid = \"w\"\nendpoint = \"tls://h\""),
+            "site.toml:4:12: `tls://h:802` cannot be spoken: this version has no TLS; write a tcp:// endpoint;",
+        ),
+        (
+            &with("[[wires]]\nid = \"w\"\nendpoint = \"rtu://pty\""),
+            "site.toml:4:12: `rtu://pty?baud=9600&parity=none&stop=1` cannot be connected to: `pty` is no serial device; \
+             write the device that the imitation printed, such as \"rtu:///dev/pts/3\"",
+        ),
+        (
+            &with("[[wires]]\nid = \"w\"\nendpoint = \"tcp://h\"\nspacing = \"11s\""),
+            "site.toml:5:11: `spacing` is 11s; write a duration from 0s to 10s",
         ),
         (
             &with(
@@ -242,11 +262,126 @@ fn all_mistakes_are_told_at_once() {
         .replace("0x10", "0");
     let found = mistakes(&text);
     let lines: Vec<&str> = found.iter().map(|line| line.split(':').nth(1).unwrap()).collect();
-    assert_eq!(lines, ["6", "20", "21", "30"], "{found:#?}");
+    assert_eq!(lines, ["6", "25", "26", "35"], "{found:#?}");
 }
 
 #[test]
 fn a_wire_with_a_bad_endpoint_is_one_mistake() {
     let text = device_with("", "").replace("tcp://h", "tcp//h");
     assert_eq!(mistakes(&text).len(), 1);
+}
+
+/// A wire of this endpoint with devices of these profiles, units 1, 2, 3 and so on.
+fn line(endpoint: &str, profiles: &[&str]) -> String {
+    let mut text = with(&format!("[[wires]]\nid = \"w\"\nendpoint = \"{endpoint}\"\n"));
+    for (index, profile) in profiles.iter().enumerate() {
+        let unit = index + 1;
+        text +=
+            &format!("[[devices]]\nid = \"d{unit}\"\nprofile = \"{profile}\"\nwire = \"w\"\nunit = {unit}\n");
+    }
+    text
+}
+
+#[test]
+fn a_line_is_set_as_every_device_on_it_can_be() {
+    let (dkg, hat, acc) = ("datakom-dkg705", "smartgen-hat821si", "smartgen-acc1700");
+    for (endpoint, profiles, expected) in [
+        (
+            "rtu:///dev/a?baud=19200",
+            &[dkg][..],
+            &[
+                "d1 (datakom-dkg705) cannot be set to 19200 baud; write baud=9600, and set every device on the line to it",
+            ][..],
+        ),
+        (
+            "rtu:///dev/a?baud=2400",
+            &[hat, acc],
+            &[
+                "d2 (smartgen-acc1700) cannot be set to 2400 baud; write one of baud=9600, baud=19200, and set every device \
+               on the line to it",
+            ],
+        ),
+        (
+            "rtu:///dev/a?baud=1200&parity=even&stop=2",
+            &[hat, dkg],
+            &[
+                "d1 (smartgen-hat821si) and d2 (datakom-dkg705) cannot be set to 1200 baud; write baud=9600, and set every \
+                 device on the line to it",
+                "d2 (datakom-dkg705) cannot be set to even parity; write parity=none, and set every device on the line to it",
+                "d2 (datakom-dkg705) cannot be set to 2 stop bits; write stop=1, and set every device on the line to it",
+            ],
+        ),
+    ] {
+        let found = mistakes(&line(endpoint, profiles));
+        let expected: Vec<String> = expected.iter().map(|text| format!("site.toml:4:12: {text}")).collect();
+        assert_eq!(found, expected);
+    }
+    for (endpoint, profiles) in [
+        ("rtu:///dev/a", &[dkg, hat, acc][..]),
+        ("rtu:///dev/a?baud=19200&parity=odd&stop=2", &[hat, acc]),
+        ("rtu+tcp://converter:4001", &[dkg, hat]),
+        ("tcp://converter", &[dkg, hat]),
+    ] {
+        let site = Site::parse("site.toml", &line(endpoint, profiles)).unwrap();
+        assert!(site.warnings.is_empty(), "{endpoint}: {:?}", site.warnings);
+    }
+}
+
+#[test]
+fn devices_that_have_no_setting_in_common_need_wires_of_their_own() {
+    let text = line("rtu:///dev/a", &["datakom-dkg705", "datakom-d"]);
+    let site = Site::parse("site.toml", &text).unwrap();
+    let mut fast = site.devices[1].profile.clone();
+    fast.wire.serial.baud = vec![38_400];
+    let place = |device: SiteDevice| PlacedDevice { device, wire: 0..0, unit: 0..0 };
+    let fast = SiteDevice { profile: Box::leak(Box::new(fast)), ..site.devices[1].clone() };
+    let wires = [PlacedWire { id: "w".to_owned(), wire: Some(site.wires[0].clone()), endpoint: 0..0 }];
+    let mut findings = Collector::new("site.toml", &text);
+    checks::serial(&wires, &[place(site.devices[0].clone()), place(fast)], &mut findings);
+    assert!(
+        findings
+            .finish()
+            .unwrap_err()
+            .to_string()
+            .contains("; these devices have no such setting in common: give")
+    );
+}
+
+#[test]
+fn what_deserves_a_look_is_no_mistake() {
+    let smartgen = |count| vec!["smartgen-acc1700"; count];
+    let warned = |text: &str| {
+        let site = Site::parse("site.toml", text).unwrap();
+        site.warnings.iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    assert_eq!(warned(&line("rtu:///dev/a", &smartgen(32))), [""; 0]);
+    assert_eq!(
+        warned(&line("rtu:///dev/a", &smartgen(34))),
+        [
+            "site.toml:168:8: 34 SmartGen units are on the wire `w`, and one RS-485 line carries 32; give the others a line \
+          of their own, or put a repeater between"
+        ]
+    );
+    let dkg = |unit| line("rtu:///dev/a", &["datakom-dkg705"]).replace("unit = 1", &format!("unit = {unit}"));
+    assert_eq!(warned(&dkg(144)), [""; 0]);
+    assert_eq!(
+        warned(&dkg(145)),
+        [
+            "site.toml:9:8: datakom-dkg705 can be set to unit 145, but its manual reaches units only up to 144; should d1 \
+          not answer, give it a unit id from 1 to 144"
+        ]
+    );
+    let found = mistakes(&dkg(251));
+    assert_eq!(found, ["site.toml:9:8: datakom-dkg705 knows no unit 251; write a number from 1 to 250"]);
+}
+
+#[test]
+fn the_sample_is_sound() {
+    let sample = include_str!("../../../../examples/site.toml");
+    let site = Site::parse("examples/site.toml", sample).unwrap_or_else(|findings| panic!("{findings}"));
+    assert!(site.warnings.is_empty(), "{:?}", site.warnings);
+    let on_the_line = site.devices.iter().filter(|device| site.wires[device.wire].id == "line");
+    assert_eq!((on_the_line.count(), site.devices.len()), (3, 4));
+    let schemes: Vec<&str> = site.wires.iter().map(|wire| wire.endpoint.scheme()).collect();
+    assert_eq!(schemes, ["tcp", "rtu"]);
 }

@@ -292,4 +292,21 @@ async fn silent_units_do_not_starve_the_one_that_answers() {
         assert_eq!(bad, None);
     }
     assert_eq!(view("gen1").await["online"], true);
+
+    // The wire says of each unit how it is, and protects the one that answers.
+    let wire = async || client.get("/api/v1/wires/w1").await.json();
+    let of = |wire: &Value, unit: usize| wire["units"][unit]["state"].clone();
+    let silent = until(wire, |wire| (1..4).all(|unit| of(wire, unit) == "silent")).await;
+    assert_eq!(of(&silent, 0), "answering");
+    let two = &silent["units"][1];
+    assert_eq!((&two["unit"], &two["device"], &two["answers"]), (&json!(2), &json!("gen2"), &json!(0)));
+    assert!(two["next_probe_s"].is_number() && two["timeouts"].as_u64() >= Some(3), "{two}");
+    // The sentence is still that of the first silence, with the way on.
+    let fault = view("gen2").await["fault"].as_str().unwrap().to_owned();
+    assert!(fault.contains("unit 2 did not answer within"), "{fault}");
+    assert!(fault.ends_with("; docs/connect/datakom-d.md says how to set it up and wire it"), "{fault}");
+
+    // A unit that comes back is seen with its next probe.
+    device.change(|device| device.absent.clear());
+    until(async || view("gen3").await, |view| view["online"] == true).await;
 }

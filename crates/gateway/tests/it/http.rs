@@ -19,6 +19,7 @@ async fn what_is_not_there_is_told_in_a_sentence() {
         "/api/v1/devices/gen9",
         "/api/v1/devices/gen9/points",
         "/api/v1/devices/gen9/values",
+        "/api/v1/devices/gen9/joined",
         "/api/v1/events?device=gen9",
     ] {
         let problem = bench.client.get(path).await.problem(404);

@@ -108,3 +108,44 @@ async fn the_wire_counts() {
         assert_eq!(statistics[counter], 0, "{counter}");
     }
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_wire_is_told_in_detail() {
+    let bench = Bench::new().await;
+    bench.until_view(|view| view["online"] == true).await;
+    let detail = bench.client.get("/api/v1/wires/w1").await.json();
+    assert_eq!((&detail["wire"]["id"], &detail["wire"]["state"]), (&json!("w1"), &json!("connected")));
+    let latency = &detail["latency"];
+    let buckets = latency["buckets"].as_array().unwrap();
+    let counted: u64 = buckets.iter().map(|bucket| bucket["count"].as_u64().unwrap()).sum();
+    assert_eq!(
+        (latency["count"].as_u64(), &buckets.last().unwrap()["up_to_ms"]),
+        (Some(counted), &json!(null))
+    );
+
+    let unit = &detail["units"][0];
+    assert_eq!(
+        (&unit["unit"], &unit["device"], &unit["state"], &unit["next_probe_s"]),
+        (&json!(1), &json!("gen1"), &json!("answering"), &json!(null))
+    );
+    assert_eq!((unit["answers"].as_u64(), &unit["time"]["busy_s"]), (Some(counted), &json!(null)));
+    assert!(detail["open_s"].as_f64().unwrap() > 0.0, "{detail}");
+
+    let plan = &detail["plans"][0];
+    assert_eq!((&plan["device"], &plan["unit"], &plan["refused"]), (&json!("gen1"), &json!(1), &json!([])));
+    let fast = &plan["rounds"][0];
+    assert_eq!((&fast["rates"], &fast["every_s"]), (&json!(["fast"]), &json!(0.05)));
+    assert_eq!(fast["reads"][0]["function"], 3);
+    assert!(plan["rounds"].as_array().unwrap().len() == 3 && plan["refresh_ms"].is_null(), "{plan}");
+
+    let unknown = bench.client.get("/api/v1/wires/w9").await.problem(404);
+    assert_eq!(unknown, "there is no wire w9; this site has w1");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_a_device_refuses_is_in_its_plan() {
+    let bench = Bench::with(|device| device.unknown = Some(10_246..=10_247)).await;
+    let plan = async || bench.client.get("/api/v1/wires/w1").await.json()["plans"][0].clone();
+    let plan = crate::support::until(plan, |plan| plan["refused"] != json!([])).await;
+    assert_eq!((&plan["refused"][0]["address"], &plan["refused"][0]["count"]), (&json!(10_246), &json!(2)));
+}

@@ -13,7 +13,7 @@ use crate::job::{Priority, Question};
 use crate::line::Line;
 use crate::queue::Place;
 
-/// So many times the time-out after it was given up, a request on RTU may still be answered.
+/// For so many times the longest time-out after that is over, a request on RTU may still be answered.
 const HORIZON: u32 = 2;
 
 /// An answer has at least so many bytes on RTU. Fewer that make no sense are noise, and the answer may still come.
@@ -52,7 +52,8 @@ impl Exchange {
 
     /// Until when its answer may come.
     fn horizon(&self) -> Duration {
-        self.deadline + self.limit.saturating_mul(HORIZON)
+        let given_up = self.deadline + (self.limit - self.timeout);
+        given_up + self.limit.saturating_mul(HORIZON)
     }
 
     /// Whether it is a write of which the device may know.
@@ -93,7 +94,7 @@ impl Wire {
             None => limit,
             // A probe is no reason to make the others wait long. Who turns out to be slower is heard late.
             Some(unit) if has_slots && unit.is_silent() => {
-                let own = unit.timing.estimate(floor, limit);
+                let own = unit.timing.probe(floor, limit);
                 own.or_else(|| self.units.slowest(floor, limit)).unwrap_or(limit)
             }
             Some(unit) => unit.timing.timeout(floor, limit),
@@ -181,7 +182,7 @@ impl Wire {
             unit.answered_late(now);
         }
         if self.line.is_rtu() {
-            self.doubts.seen(stray);
+            self.doubts.seen(now, stray);
             // Who sends what nobody asked for may send more of it.
             self.earliest = self.earliest.max(now + DEFAULT_QUIET);
         }

@@ -5,6 +5,7 @@ use std::task::Wake;
 
 use super::*;
 use crate::endpoint::Serial;
+use crate::error::Outage;
 use crate::heard::Heard;
 use crate::job::{Ask, Write};
 
