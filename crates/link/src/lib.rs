@@ -12,9 +12,12 @@
 //!   blamed for it while others on the wire answer.
 //! - **Commands go first**, then what a person waits for, then polling ([`Priority`]).
 //!
+//! [`command`] drives a remote command of a profile over a link.
+//!
 //! Inside, `wire` holds every rule as a pure state machine that is given the time; `shared` puts it and the connection
 //! behind one lock; `task` connects and keeps time.
 
+pub mod command;
 mod endpoint;
 mod error;
 mod job;
