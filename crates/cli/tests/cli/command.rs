@@ -75,7 +75,7 @@ fn people_get_the_verdict_and_what_was_seen() {
 #[test]
 fn wrong_calls_say_what_is_allowed() {
     for (arguments, part) in [
-        ("datakom-d", "<NAME>, --to <URL> is missing"),
+        ("datakom-d", "<NAME> is missing; write busbar command"),
         (
             "datakom-d chanel --to tcp://127.0.0.1:1",
             "datakom-d has no command \"chanel\"; did you mean channel? it has stop, auto, test,",

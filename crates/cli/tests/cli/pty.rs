@@ -61,6 +61,7 @@ impl Terminal {
     fn wait(&mut self, done: impl Fn(&str) -> bool) {
         let mut buffer = [0; 4096];
         while !done(&self.seen) {
+            assert!(self.seen.len() < 1_000_000, "it never comes:\n{}", self.screen().join("\n"));
             let count = self.master.read(&mut buffer).unwrap_or_default();
             assert!(count > 0, "it ended after:\n{}", self.seen);
             self.seen.push_str(&String::from_utf8_lossy(&buffer[..count]));
@@ -200,6 +201,7 @@ fn a_narrow_window_loses_columns_and_a_low_one_lines() {
     let screen = terminal.screen();
     assert_eq!(screen.len(), 8, "{screen:#?}");
     assert!(screen[6].contains("more lines: name fewer POINTs"), "{screen:#?}");
+    assert!(screen[3].starts_with("NAME") && screen[3].contains("VALUE"), "{screen:#?}");
     assert!(screen.iter().all(|line| !line.contains("POINT ") && !line.contains("ADDRESS")), "{screen:#?}");
 }
 

@@ -18,7 +18,7 @@ struct Story {
     steps: &'static [&'static str],
 }
 
-const STORIES: [Story; 14] = [
+const STORIES: [Story; 15] = [
     Story {
         profile: "datakom-d",
         options: "--model D-500 --speed 20",
@@ -36,13 +36,14 @@ const STORIES: [Story; 14] = [
             "up: unknown 1",
             "down press=short: unknown 1",
             "run: done 1",
-            "until operation_status=Off load",
+            "until operation_status=Running off load",
             "gcb: done 1",
             "mcb press=short: done 1",
-            "reset: done 1",
             "auto: done 1",
         ],
     },
+    // At twenty times the pace the restart would be over between two looks.
+    Story { profile: "datakom-d", options: "", steps: &["reset: done 1", "stop: done 1"] },
     Story { profile: "datakom-d", options: "--model D-545", steps: &["run: done 1", "manual: refused 0"] },
     Story { profile: "datakom-d", options: "--model D-700", steps: &["manual: done 1", "run: done 1"] },
     Story {

@@ -2,7 +2,7 @@
 //!
 //! The cursor goes back up to the first line and every line is written over. Nothing else is asked of the terminal, so
 //! that there is nothing to put back at the end: the last table stays, as any other output does. A window that is too
-//! narrow loses columns and then the ends of lines; one that is too low loses lines, and the last one says how many.
+//! narrow loses columns, then the ends of names and of lines; one that is too low loses lines, and the last one says how many.
 
 use std::io;
 
@@ -18,6 +18,11 @@ use crate::{
 
 /// What the size is taken for where the terminal does not tell.
 const USUAL: (usize, usize) = (80, 24);
+
+/// Of a narrow window the values have as much as they need, up to so many columns with their state.
+const MOST_VALUE: usize = 26;
+/// A name has at least so many.
+const LEAST_NAME: usize = 8;
 
 /// The table and where it stands.
 pub(super) struct Screen {
@@ -52,7 +57,7 @@ impl Screen {
         let rounds = people::count(usize::try_from(state.rounds()).unwrap_or(usize::MAX), "round");
         let mut lines = vec![
             style.title(&self.title),
-            style.dim(&format!("{}, {rounds}; Ctrl-C ends it", now.strftime("%Y-%m-%d %H:%M:%S UTC"))),
+            style.dim(&format!("Ctrl-C ends it; {rounds}, {}", now.strftime("%Y-%m-%d %H:%M:%S UTC"))),
         ];
         if let Some(reason) = state.reason() {
             lines.extend(wrap(&format!("NO ANSWER: {reason}"), width).iter().map(|line| style.alarm(line)));
@@ -102,6 +107,7 @@ fn table(state: &State<'_>, now: Timestamp, style: Style, width: usize) -> Strin
     ])
     .optional(&["POINT", "ADDRESS", "AGE"]);
     let numbers = people::number_width(seen.iter().map(|seen| (seen.point, &seen.reading)));
+    let name_room = width.saturating_sub(MOST_VALUE + 2).max(LEAST_NAME);
     for group in &profile.groups {
         let own = |seen: &&Seen<'_>| profile.group(seen.point).id == group.id;
         if seen.iter().any(|seen| own(&seen)) {
@@ -111,7 +117,7 @@ fn table(state: &State<'_>, now: Timestamp, style: Style, width: usize) -> Strin
             let mut lines = people::lines(seen.point, &seen.reading, numbers).into_iter();
             table.row([
                 Cell::dim(seen.point.address.to_string()),
-                seen.point.name.as_str().into(),
+                shorten(&seen.point.name, name_room).into(),
                 lines.next().unwrap_or_default(),
                 note(seen),
                 Cell::dim(seen.age.map(age).unwrap_or_default()),
@@ -124,6 +130,14 @@ fn table(state: &State<'_>, now: Timestamp, style: Style, width: usize) -> Strin
         }
     }
     table.render(style, Some(width))
+}
+
+/// A name that is too long, with a mark where it was cut.
+fn shorten(name: &str, room: usize) -> String {
+    match name.chars().count() <= room {
+        true => name.to_owned(),
+        false => name.chars().take(room.saturating_sub(1)).chain(['…']).collect(),
+    }
 }
 
 /// The state in a word, so that nobody needs the colour.
