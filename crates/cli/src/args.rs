@@ -48,10 +48,11 @@ pub(crate) enum Command {
     Registers(Registers),
     /// Send one remote command, watch for its effect, print the verdict
     #[command(
+        name = "command",
         after_help = "The verdict is done (the state asked for shows), refused (nothing was changed), no_effect (it did not come)\n\
         or unknown (nothing shows it, or the device fell silent). A write is sent once and never repeated."
     )]
-    Command(Order),
+    Order(Order),
 }
 
 #[derive(Debug, clap::Args)]
@@ -218,7 +219,7 @@ pub(crate) struct Order {
     /// Unit id of the controller [default: the profile's]
     #[arg(long, value_name = "N", value_parser = unit)]
     pub(crate) unit: Option<u8>,
-    /// Send it without asking, whatever it may do; without a terminal it is needed
+    /// Send it without asking, whatever it may do; stands for a typed confirmation too, and is needed without a terminal
     #[arg(long)]
     pub(crate) yes: bool,
     #[command(flatten)]

@@ -31,6 +31,6 @@ pub(crate) fn dispatch(args: Args) -> Result<(), Failure> {
         Command::Read(args) => read::run(&args, json),
         Command::Watch(args) => watch::run(&args, json),
         Command::Registers(args) => registers::run(&args, json),
-        Command::Command(args) => command::run(&args, json),
+        Command::Order(args) => command::run(&args, json),
     }
 }

@@ -129,7 +129,7 @@ fn screen(text: &str, (columns, rows): (usize, usize)) -> Vec<String> {
                     'm' => {}
                     'F' => {
                         assert!(number < rows, "the cursor leaves the screen");
-                        row = row.checked_sub(number).expect("above the first line");
+                        row = row.checked_sub(number).unwrap();
                         column = 0;
                     }
                     'K' => lines[row] = lines[row].chars().take(column).collect(),

@@ -186,7 +186,7 @@ fn wait_until(profile: &str, wire: &str, state: &str) {
     let deadline = Instant::now() + Duration::from_secs(60);
     loop {
         let reading = busbar(&format!("read {profile} {point} {wire} --json")).ok().json()[0].clone();
-        if reading["value"] == value || reading["code"].to_string() == value {
+        if reading["value"] == value || value.parse::<u32>().is_ok_and(|code| reading["code"] == code) {
             return;
         }
         assert!(Instant::now() < deadline, "{point} never is {value}: {reading}");
