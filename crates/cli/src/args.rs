@@ -42,8 +42,17 @@ pub(crate) enum Command {
     Plan(Plan),
     /// Read points once
     Read(Read),
+    /// Read points again and again, live in the terminal
+    Watch(Watch),
     /// Raw registers without a profile: proves the wiring
     Registers(Registers),
+    /// Send one remote command, watch for its effect, print the verdict
+    #[command(
+        name = "command",
+        after_help = "The verdict is done (the state asked for shows), refused (nothing was changed), no_effect (it did not come)\n\
+        or unknown (nothing shows it, or the device fell silent). A write is sent once and never repeated."
+    )]
+    Order(Order),
 }
 
 #[derive(Debug, clap::Args)]
@@ -174,6 +183,51 @@ pub(crate) struct Read {
 }
 
 #[derive(Debug, clap::Args)]
+pub(crate) struct Watch {
+    /// A built-in profile or a path to a profile file
+    #[arg(value_name = "KEY")]
+    pub(crate) key: String,
+    /// The wire, for example tcp://192.168.1.10:502
+    #[arg(long, value_name = "URL", value_parser = endpoint)]
+    pub(crate) from: Endpoint,
+    /// Unit id of the controller [default: the profile's]
+    #[arg(long, value_name = "N", value_parser = unit)]
+    pub(crate) unit: Option<u8>,
+    /// Points to read in every round; when none is named, each as often as its profile says
+    #[arg(value_name = "POINT")]
+    pub(crate) points: Vec<String>,
+    /// From the start of one round to the next, where the wire is fast enough: 500ms, 5s
+    #[arg(long, value_name = "TIME", default_value = "1s", value_parser = duration)]
+    pub(crate) every: Duration,
+    #[command(flatten)]
+    pub(crate) wire: Wire,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Order {
+    /// A built-in profile or a path to a profile file
+    #[arg(value_name = "KEY")]
+    pub(crate) key: String,
+    /// The command, as "busbar profile show KEY" lists it
+    #[arg(value_name = "NAME")]
+    pub(crate) name: String,
+    /// Its arguments, for example press=long
+    #[arg(value_name = "ARG=VALUE", value_parser = argument)]
+    pub(crate) arguments: Vec<(String, String)>,
+    /// The wire, for example tcp://192.168.1.10:502
+    #[arg(long, value_name = "URL", value_parser = endpoint)]
+    pub(crate) to: Endpoint,
+    /// Unit id of the controller [default: the profile's]
+    #[arg(long, value_name = "N", value_parser = unit)]
+    pub(crate) unit: Option<u8>,
+    /// Send it without asking, whatever it may do; stands for a typed confirmation too, and is needed without a terminal
+    #[arg(long)]
+    pub(crate) yes: bool,
+    #[command(flatten)]
+    pub(crate) wire: Wire,
+}
+
+#[derive(Debug, clap::Args)]
 pub(crate) struct Registers {
     /// The wire, for example tcp://192.168.1.10:502
     #[arg(value_name = "URL", value_parser = endpoint)]
@@ -291,6 +345,15 @@ fn pin(text: &str) -> Result<(String, String), String> {
             Ok((point.trim().to_owned(), value.trim().to_owned()))
         }
         _ => Err("write POINT=VALUE, for example fuel_level=12.5".to_owned()),
+    }
+}
+
+fn argument(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() && !value.is_empty() => {
+            Ok((name.to_owned(), value.to_owned()))
+        }
+        _ => Err("write ARG=VALUE, for example press=long".to_owned()),
     }
 }
 

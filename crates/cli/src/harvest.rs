@@ -9,7 +9,7 @@ use busbar_link::LinkError;
 use busbar_modbus::ExceptionCode;
 use busbar_profile::{
     Image, Profile,
-    plan::{Cost, Planner, Read, items},
+    plan::{Planner, Read, items},
 };
 use jiff::Timestamp;
 
@@ -46,9 +46,8 @@ impl Done {
 }
 
 impl<'p> Harvest<'p> {
-    /// The reads for the points with these indexes, planned at `cost`.
-    pub(crate) fn new(profile: &'p Profile, points: &[usize], cost: Cost) -> Self {
-        let planner = Planner::new(profile, cost);
+    /// The reads for the points with these indexes.
+    pub(crate) fn new(profile: &'p Profile, planner: Planner, points: &[usize]) -> Self {
         let wanted: Vec<(u16, u16)> = items(profile, points).collect();
         let queue = planner.reads(wanted.iter().copied()).into();
         let image = Image::new(profile);
@@ -164,6 +163,11 @@ impl<'p> Harvest<'p> {
         own.clone().find(|done| done.error.is_some()).or_else(|| own.next_back())
     }
 
+    /// The planner, with what it has learned of the device.
+    pub(crate) fn into_planner(self) -> Planner {
+        self.planner
+    }
+
     /// How many reads were answered.
     pub(crate) fn answers(&self) -> usize {
         self.answers
@@ -174,7 +178,7 @@ impl<'p> Harvest<'p> {
 mod tests {
     use std::time::Duration;
 
-    use busbar_profile::builtin;
+    use busbar_profile::{builtin, plan::Cost};
 
     use super::*;
 
@@ -183,7 +187,8 @@ mod tests {
     fn harvest(points: &[&str]) -> (Harvest<'static>, Vec<usize>) {
         let profile = builtin("datakom-d").unwrap();
         let indexes: Vec<usize> = points.iter().map(|id| profile.point_index(id).unwrap()).collect();
-        (Harvest::new(profile, &indexes, Cost::tcp(Duration::from_millis(20), 100_000)), indexes)
+        let planner = Planner::new(profile, Cost::tcp(Duration::from_millis(20), 100_000));
+        (Harvest::new(profile, planner, &indexes), indexes)
     }
 
     fn read(address: u16, count: u16) -> Read {

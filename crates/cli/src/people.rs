@@ -50,6 +50,17 @@ pub(crate) fn lines(point: &Point, reading: &Reading<'_>, width: usize) -> Vec<C
     }
 }
 
+/// A value in one line.
+pub(crate) fn line(point: &Point, reading: &Reading<'_>) -> String {
+    let lines = lines(point, reading, 0);
+    lines.iter().map(Cell::text).collect::<Vec<_>>().join(", ")
+}
+
+/// So many of something: `1 point`, `2 points`.
+pub(crate) fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
 /// How serious a bit that is set looks.
 fn look(point: &Point, bit: u16) -> Look {
     match point.bit(bit).and_then(|bit| bit.class).or(point.class) {
@@ -78,7 +89,7 @@ fn digit_lines(digits: &str, group: usize, what: &str) -> Vec<Cell> {
 }
 
 /// A number and its unit, as people write it.
-fn with_unit(number: String, unit: Option<&str>) -> String {
+pub(crate) fn with_unit(number: String, unit: Option<&str>) -> String {
     match unit {
         Some(unit) => format!("{number} {}", self::unit(unit)),
         None => number,

@@ -2,12 +2,15 @@
 
 use std::{fs, ops::Deref, path::Path};
 
-use busbar_profile::{Findings, Point, Profile, builtin, builtins};
+use busbar_profile::{Command, Findings, Point, Profile, builtin, builtins};
 
 use crate::{
     excerpt::{Excerpt, Excerpts},
     failure::Failure,
 };
+
+/// More commands than this are not listed in a sentence.
+const MOST_LISTED: usize = 24;
 
 /// A profile, wherever it came from.
 #[derive(Debug)]
@@ -83,6 +86,40 @@ fn readable(profile: &Profile, id: &str, key: &str) -> Result<usize, Failure> {
         )));
     }
     Ok(index)
+}
+
+/// The command of that id; KEY as the caller wrote it.
+pub(crate) fn command<'p>(profile: &'p Profile, id: &str, key: &str) -> Result<&'p Command, Failure> {
+    if let Some(command) = profile.command(id) {
+        return Ok(command);
+    }
+    let ids: Vec<&str> = profile.commands.iter().map(|command| command.id.as_str()).collect();
+    let like: Vec<&str> =
+        ids.iter().copied().filter(|other| !id.is_empty() && resembles(id, other)).take(3).collect();
+    let meant = match like.as_slice() {
+        [] => String::new(),
+        like => format!("did you mean {}? ", like.join(", ")),
+    };
+    let known = match ids.len() {
+        0 => "it has none".to_owned(),
+        1..=MOST_LISTED => format!("it has {}", ids.join(", ")),
+        _ => format!("\"busbar profile show {key}\" lists them"),
+    };
+    Err(Failure::Call(format!("{} has no command \"{id}\"; {meant}{known}", profile.key)))
+}
+
+/// Whether one is a part of the other, or they differ by a letter that is wrong, missing or too many.
+fn resembles(word: &str, other: &str) -> bool {
+    if word.contains(other) || other.contains(word) {
+        return true;
+    }
+    let same = |a: &mut dyn Iterator<Item = char>, b: &mut dyn Iterator<Item = char>| {
+        a.zip(b).take_while(|(a, b)| a == b).count()
+    };
+    let (a, b) = (word.chars().count(), other.chars().count());
+    let start = same(&mut word.chars(), &mut other.chars());
+    let end = same(&mut word.chars().rev(), &mut other.chars().rev());
+    a.abs_diff(b) <= 1 && start + end + 1 >= a.max(b)
 }
 
 /// Reads and checks a profile file.

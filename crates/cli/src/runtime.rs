@@ -11,15 +11,22 @@ use crate::failure::Failure;
 
 /// Runs `work` on one thread until it is done. A signal to stop ends it at once, and that is no failure.
 pub(crate) fn once(work: impl Future<Output = Result<(), Failure>>) -> Result<(), Failure> {
-    let runtime = build(&mut Builder::new_current_thread())?;
-    let done = runtime.block_on(async {
-        let mut stop = Stop::listen()?;
+    attended(async |mut stop| {
         select! {
             done = work => done,
             () = stop.wait() => Ok(()),
         }
-    });
-    // A host name that is still being looked up must not hold the exit.
+    })
+}
+
+/// Runs `work`, which is handed the signals to stop, on one thread.
+pub(crate) fn attended<F>(work: impl FnOnce(Stop) -> F) -> Result<(), Failure>
+where
+    F: Future<Output = Result<(), Failure>>,
+{
+    let runtime = build(&mut Builder::new_current_thread())?;
+    let done = runtime.block_on(async { work(Stop::listen()?).await });
+    // A host name that is still being looked up, or a question without an answer, must not hold the exit.
     runtime.shutdown_background();
     done
 }

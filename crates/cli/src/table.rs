@@ -38,6 +38,11 @@ impl Cell {
         Self::new(text, Look::Dim)
     }
 
+    /// What stands in it.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+
     fn width(&self) -> usize {
         self.text.chars().count()
     }

@@ -53,6 +53,23 @@ pub(crate) fn width() -> Option<usize> {
     Some(width.0.into())
 }
 
+/// Columns and rows of the terminal that standard output is.
+pub(crate) fn size() -> Option<(usize, usize)> {
+    let (width, height) = terminal_size::terminal_size_of(io::stdout())?;
+    Some((width.0.into(), height.0.into()))
+}
+
+/// Whether standard output is a terminal on which the cursor can be moved.
+pub(crate) fn can_redraw() -> bool {
+    size().is_some_and(|(width, height)| width > 0 && height > 0)
+        && env::var_os("TERM").is_none_or(|term| term != "dumb")
+}
+
+/// Whether standard error is a terminal.
+pub(crate) fn error_is_terminal() -> bool {
+    io::stderr().is_terminal()
+}
+
 /// Whether standard error takes colour.
 pub(crate) fn error_is_coloured() -> bool {
     io::stderr().is_terminal() && colour_is_wanted()

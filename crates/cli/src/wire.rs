@@ -2,11 +2,14 @@
 
 use std::time::Duration;
 
-use busbar_link::{Direction, Endpoint, Link, LinkError, Options, Trace};
-use busbar_profile::{OverRead, Profile, plan::Cost};
+use busbar_link::{Cause, Direction, Endpoint, Link, LinkError, Options, StopBits, Trace};
+use busbar_profile::{OverRead, Parity, Profile, builtin, plan::Cost};
 use jiff::{SignedDuration, Timestamp};
 
 use crate::{args, failure::Failure, terminal};
+
+/// Unit ids above which a manual contradicts itself.
+const DOUBTFUL_UNITS: [(&str, u8); 1] = [("datakom-dkg705", 144)];
 
 /// Opens the wire. What the command line leaves open, the profile says; without one the defaults of the link hold.
 ///
@@ -34,6 +37,61 @@ pub(crate) fn open(
     Ok(Link::open(endpoint.clone(), options).map_err(Failure::failed)?.with_short_answers(short))
 }
 
+/// The unit id to ask: the caller's, else the profile's.
+pub(crate) fn unit(profile: &Profile, given: Option<u8>) -> Result<u8, Failure> {
+    let range = profile.wire.unit;
+    let (key, min, max) = (&profile.key, range.min, range.max);
+    let Some(unit) = given.or(range.default) else {
+        return Err(Failure::Call(format!(
+            "the manual of {key} gives no unit id as delivered; write --unit N, {min} to {max}"
+        )));
+    };
+    if !(min..=max).contains(&unit) {
+        return Err(Failure::Call(format!(
+            "{key} cannot be set to unit {unit}; write --unit N, {min} to {max}, as it is set at the controller"
+        )));
+    }
+    let doubtful = DOUBTFUL_UNITS.iter().find(|(doubtful, last)| doubtful == key && unit > *last);
+    if let Some((_, last)) = doubtful {
+        terminal::message(&format!(
+            "the manual of {key} allows unit {unit} in one place and ends at {last} in others; if it does not answer, set one up to {last}"
+        ));
+    }
+    Ok(unit)
+}
+
+/// Refuses a serial line that the controller cannot be set to.
+pub(crate) fn check_line(profile: &Profile, endpoint: &Endpoint) -> Result<(), Failure> {
+    let Endpoint::Rtu { serial, .. } = endpoint else { return Ok(()) };
+    let own = &profile.wire.serial;
+    let parity = match serial.parity {
+        busbar_link::Parity::None => Parity::None,
+        busbar_link::Parity::Even => Parity::Even,
+        busbar_link::Parity::Odd => Parity::Odd,
+    };
+    let stop = match serial.stop {
+        StopBits::One => 1,
+        StopBits::Two => 2,
+    };
+    let refuse = |setting: &str, has: Vec<String>| {
+        Err(Failure::Call(format!(
+            "{} cannot be set to {setting}; it has {}, write the one that is set at the controller",
+            profile.key,
+            has.join(", ")
+        )))
+    };
+    if !own.baud.contains(&serial.baud) {
+        return refuse(&format!("baud={}", serial.baud), own.baud.iter().map(u32::to_string).collect());
+    }
+    if !own.parity.contains(&parity) {
+        return refuse(&format!("parity={parity}"), own.parity.iter().map(Parity::to_string).collect());
+    }
+    if !own.stop.contains(&stop) {
+        return refuse(&format!("stop={stop}"), own.stop.iter().map(u8::to_string).collect());
+    }
+    Ok(())
+}
+
 /// What a read costs on this wire. Networks are taken for slow ones: there a request costs more than some bytes.
 pub(crate) fn cost(endpoint: &Endpoint, profile: &Profile) -> Cost {
     match endpoint {
@@ -59,7 +117,8 @@ fn trace() -> Trace {
     })
 }
 
-/// Why a read has no result, with the maker's name of an exception where the profile gives one.
+/// Why a read has no result, with the maker's name of an exception where the profile gives one, and where there was no
+/// answer with the page that says what to check.
 pub(crate) fn sentence(error: &LinkError, profile: Option<&Profile>) -> String {
     match error {
         LinkError::Exception { unit, function, code } => {
@@ -70,6 +129,32 @@ pub(crate) fn sentence(error: &LinkError, profile: Option<&Profile>) -> String {
                 own.unwrap_or(code.name())
             )
         }
+        _ if is_no_answer(error) => format!("{error}; {}", advice(profile)),
         _ => error.to_string(),
+    }
+}
+
+/// Whether setting up the controller or its wiring may be what is wrong.
+fn is_no_answer(error: &LinkError) -> bool {
+    match error {
+        LinkError::Timeout { .. } => true,
+        LinkError::Down { reason } => matches!(
+            reason.cause,
+            Cause::Refused
+                | Cause::Unreachable
+                | Cause::ConnectTimedOut { .. }
+                | Cause::StillConnecting { .. }
+                | Cause::Silent { .. }
+                | Cause::Garbage
+        ),
+        _ => false,
+    }
+}
+
+/// Where it stands what to set at the controller, and what to check on the wire.
+fn advice(profile: Option<&Profile>) -> String {
+    match profile.filter(|profile| builtin(&profile.key).is_some()) {
+        Some(profile) => format!("docs/connect/{}.md says what to check", profile.key),
+        None => "docs/connect/ has a page a controller on what to check".to_owned(),
     }
 }

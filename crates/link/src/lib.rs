@@ -26,6 +26,8 @@
 //!   while the answer to a lost request may still come, for twice the time-out, its unit is asked nothing else whose
 //!   answer looks the same. The same read may be asked again: either answer is right.
 //!
+//! [`command`] drives a remote command of a profile over a link.
+//!
 //! Inside, `wire` holds every rule as a pure state machine that is given the time; `shared` puts it and the connection
 //! behind one lock; `task` connects and keeps time. `stream` is the connection, whatever it is made of; on RTU wires
 //! `echo` stands between it and the rules.
@@ -33,6 +35,7 @@
 mod clock;
 mod doubt;
 mod echo;
+pub mod command;
 mod endpoint;
 mod error;
 mod heard;

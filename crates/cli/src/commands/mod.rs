@@ -1,5 +1,6 @@
 //! One module a command.
 
+mod command;
 mod decode;
 mod demo;
 mod emulate;
@@ -9,6 +10,7 @@ mod profile;
 mod read;
 mod registers;
 mod run;
+mod watch;
 
 use crate::{
     args::{Args, Command},
@@ -27,6 +29,8 @@ pub(crate) fn dispatch(args: Args) -> Result<(), Failure> {
         Command::Frame(args) => frame::run(&args, json),
         Command::Plan(args) => plan::run(&args, json),
         Command::Read(args) => read::run(&args, json),
+        Command::Watch(args) => watch::run(&args, json),
         Command::Registers(args) => registers::run(&args, json),
+        Command::Order(args) => command::run(&args, json),
     }
 }

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, time::Instant};
 
 use busbar_link::Link;
-use busbar_profile::{Point, Profile, Quality, Reading, no_reading, reading};
+use busbar_profile::{Point, Profile, Quality, Reading, WordOrder, no_reading, plan::Planner, reading};
 use jiff::Timestamp;
 use serde::Serialize;
 
@@ -18,7 +18,7 @@ use crate::{
 
 /// A reading with its time and the reason where there is none, as `--json` prints it.
 #[derive(Serialize)]
-struct Timed<'a> {
+pub(super) struct Timed<'a> {
     #[serde(flatten)]
     reading: Reading<'a>,
     ts: String,
@@ -31,15 +31,22 @@ struct Timed<'a> {
 pub(crate) fn run(args: &args::Read, json: bool) -> Result<(), Failure> {
     let profile = profiles::resolve(&args.key)?;
     let points = points(&profile, args)?;
-    let unit = unit(&profile, args)?;
+    let unit = wire::unit(&profile, args.unit)?;
+    wire::check_line(&profile, &args.from)?;
     runtime::once(async {
         let link = wire::open(&args.from, &args.wire, Some(&profile))?;
         let started = Instant::now();
-        let harvest = harvest(&link, &profile, &with_identity(&profile, &points), unit).await;
+        let mut harvest = Harvest::new(
+            &profile,
+            Planner::new(&profile, wire::cost(link.endpoint(), &profile)),
+            &with_identity(&profile, &points),
+        );
+        gather(&link, &profile, unit, &mut harvest).await;
         report(&profile, &points, &harvest, args, json)?;
         if !json && harvest.answers() > 0 {
-            let (points, answers, ms) = (points.len(), harvest.answers(), started.elapsed().as_millis());
-            terminal::message(&format!("{points} points in {answers} answers, {ms} ms"));
+            let points = people::count(points.len(), "point");
+            let answers = people::count(harvest.answers(), "answer");
+            terminal::message(&format!("{points} in {answers}, {} ms", started.elapsed().as_millis()));
         }
         match points.iter().all(|point| harvest.registers(*point).is_some()) {
             true => Ok(()),
@@ -57,25 +64,8 @@ fn points(profile: &Profile, args: &args::Read) -> Result<Vec<usize>, Failure> {
     profiles::points(profile, &args.points, &args.key)
 }
 
-fn unit(profile: &Profile, args: &args::Read) -> Result<u8, Failure> {
-    let range = profile.wire.unit;
-    let Some(unit) = args.unit.or(range.default) else {
-        return Err(Failure::Call(format!(
-            "the manual of {} gives no unit id as delivered; write --unit N, {} to {}",
-            profile.key, range.min, range.max
-        )));
-    };
-    if !(range.min..=range.max).contains(&unit) {
-        terminal::message(&format!(
-            "unit {unit} is outside {} to {}, which {} can be set to",
-            range.min, range.max, profile.key
-        ));
-    }
-    Ok(unit)
-}
-
 /// The points and, where a label depends on the model, the one that tells it.
-fn with_identity(profile: &Profile, points: &[usize]) -> Vec<usize> {
+pub(super) fn with_identity(profile: &Profile, points: &[usize]) -> Vec<usize> {
     let depends = |point: &Point| point.choices.iter().any(|choice| !choice.by_model.is_empty());
     let mut points = points.to_vec();
     if let Some(identity) = &profile.identity
@@ -86,8 +76,8 @@ fn with_identity(profile: &Profile, points: &[usize]) -> Vec<usize> {
     points
 }
 
-async fn harvest<'p>(link: &Link, profile: &'p Profile, points: &[usize], unit: u8) -> Harvest<'p> {
-    let mut harvest = Harvest::new(profile, points, wire::cost(link.endpoint(), profile));
+/// Does all the reads that are still to do.
+pub(super) async fn gather(link: &Link, profile: &Profile, unit: u8, harvest: &mut Harvest<'_>) {
     while let Some(read) = harvest.next() {
         match link.read_registers(unit, read.function, read.address, read.count).await {
             Ok(registers) => harvest.answered(read, &registers, Timestamp::now()),
@@ -96,7 +86,6 @@ async fn harvest<'p>(link: &Link, profile: &'p Profile, points: &[usize], unit: 
             }
         }
     }
-    harvest
 }
 
 fn report(
@@ -109,7 +98,25 @@ fn report(
     let order = args.wire.word_order.unwrap_or(profile.wire.word_order);
     let identity = profile.identity.as_ref().map(|identity| identity.point);
     let model = profiles::model(profile, |_| harvest.registers(identity?));
-    let readings: Vec<Timed<'_>> = points
+    let readings = timed(profile, points, harvest, order, model);
+    if json {
+        terminal::print_json(&readings)?;
+    } else if harvest.answers() > 0 {
+        terminal::print(&table(profile, &readings))?;
+    }
+    say_why(&readings);
+    Ok(())
+}
+
+/// What a harvest brought of these points.
+pub(super) fn timed<'a>(
+    profile: &'a Profile,
+    points: &[usize],
+    harvest: &'a Harvest<'_>,
+    order: WordOrder,
+    model: Option<&str>,
+) -> Vec<Timed<'a>> {
+    points
         .iter()
         .filter_map(|index| {
             let point = profile.points.get(*index)?;
@@ -121,14 +128,7 @@ fn report(
             };
             Some(Timed { reading, ts: format!("{ts:.3}"), error, point })
         })
-        .collect();
-    if json {
-        terminal::print_json(&readings)?;
-    } else if harvest.answers() > 0 {
-        terminal::print(&table(profile, &readings))?;
-    }
-    say_why(&readings);
-    Ok(())
+        .collect()
 }
 
 /// One sentence for each reason why points were not read.

@@ -17,7 +17,9 @@ fn help_texts() {
         "frame",
         "plan",
         "read",
+        "watch",
         "registers",
+        "command",
     ] {
         let help = busbar(&format!("{command} --help")).ok().silently().out();
         insta::assert_snapshot!(format!("help_{}", command.replace(' ', "_")), help);
@@ -39,8 +41,6 @@ fn nothing_asked_for_is_help_and_status_2() {
 fn wrong_calls_are_one_sentence_and_status_2() {
     for (arguments, part) in [
         ("frobnicate", "there is no command \"frobnicate\""),
-        ("watch datakom-d --from tcp://127.0.0.1:1", "there is no command \"watch\""),
-        ("command datakom-d auto --to tcp://127.0.0.1:1", "there is no command \"command\""),
         ("decode datakom-d", "<ADDRESS>, <REG>... is missing"),
         ("decode datakom-d 1024x 0000", "an address is 0 to 65535, decimal or hex behind 0x"),
         ("decode datakom-d 65536 0000", "an address is 0 to 65535"),
@@ -74,6 +74,29 @@ fn wrong_calls_are_one_sentence_and_status_2() {
             "registers tcp://127.0.0.1:1 0 1 --function 6",
             "function 3 reads holding registers and 4 input registers",
         ),
+        (
+            "read datakom-d --from tcp://127.0.0.1:1 --unit 241",
+            "datakom-d cannot be set to unit 241; write --unit N, 1 to 240",
+        ),
+        ("read datakom-dkg705 --from tcp://127.0.0.1:1", "write --unit N, 1 to 250"),
+        ("read smartgen-acc1700 --from tcp://127.0.0.1:1 --unit 0", "cannot be set to unit 0"),
+        (
+            "read datakom-dkg705 --unit 1 --from rtu:///dev/null?baud=19200",
+            "datakom-dkg705 cannot be set to baud=19200; it has 9600,",
+        ),
+        (
+            "watch datakom-d --from rtu:///dev/null?parity=even",
+            "datakom-d cannot be set to parity=even; it has none,",
+        ),
+        (
+            "command datakom-d auto --yes --to rtu:///dev/null?stop=2",
+            "datakom-d cannot be set to stop=2; it has 1,",
+        ),
+        ("watch datakom-d", "--from <URL> is missing"),
+        ("watch datakom-x --from tcp://127.0.0.1:1", "there is no profile \"datakom-x\""),
+        ("watch datakom-d --from tcp://127.0.0.1:1 fuel", "did you mean fuel_level"),
+        ("watch datakom-d --from tcp://127.0.0.1:1 --every 0", "write a time above zero"),
+        ("command datakom-d auto", "--to <URL> is missing"),
         ("emulate datakom-d", "--listen <URL> is missing"),
         ("emulate datakom-x --listen tcp://127.0.0.1:0", "there is no profile \"datakom-x\""),
         ("emulate datakom-d --listen tcp://127.0.0.1:0 --unit 0", "0 is the broadcast address"),

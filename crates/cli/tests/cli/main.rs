@@ -3,6 +3,7 @@
 // Helpers of tests may fail as tests do; clippy's exception for tests stops at functions marked as such.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod command;
 mod decode;
 mod frame;
 mod guide;
@@ -10,6 +11,10 @@ mod help;
 mod peer;
 mod plan;
 mod profile;
+#[cfg(unix)]
+mod pty;
 mod services;
 mod support;
+mod verdicts;
+mod watch;
 mod wire;

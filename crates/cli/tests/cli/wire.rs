@@ -283,6 +283,45 @@ fn trace_shows_frames_with_their_time() {
 }
 
 #[test]
+fn one_of_something_is_no_plural() {
+    let peer = Peer::new(|request| request.addresses());
+    busbar(&format!("read datakom-d --from {} fuel_level", peer.url))
+        .ok()
+        .says_in_one_sentence("1 point in 1 answer, ");
+}
+
+#[test]
+fn who_does_not_answer_is_looked_for_by_the_page() {
+    let peer = Peer::new(|_| Vec::new());
+    for (key, page) in [
+        ("datakom-d", "docs/connect/datakom-d.md"),
+        ("datakom-dkg705", "docs/connect/datakom-dkg705.md"),
+        ("smartgen-hat821si", "docs/connect/smartgen-hat821si.md"),
+        ("smartgen-acc1700", "docs/connect/smartgen-acc1700.md"),
+    ] {
+        busbar(&format!("read {key} --from {} --unit 1 --timeout 50ms", peer.url))
+            .fails()
+            .says_in_one_sentence(&format!("; {page} says what to check"));
+    }
+    busbar(&format!("registers {} 0 1 --timeout 50ms", peer.url))
+        .fails()
+        .says_in_one_sentence("; docs/connect/ has a page a controller");
+    // The resolver refuses so long a label without asking anybody; and no page helps there.
+    let unknown = "genset".repeat(11);
+    let call = busbar(&format!("registers tcp://{unknown} 0 1")).fails();
+    call.says_in_one_sentence("check its spelling, or use the address\n");
+}
+
+#[test]
+fn a_unit_id_in_doubt_is_a_warning() {
+    let peer = Peer::new(|request| request.addresses());
+    busbar(&format!("read datakom-dkg705 --from {} --unit 145 fuel_level", peer.url))
+        .ok()
+        .mentions("ends at 144 in others");
+    busbar(&format!("read datakom-dkg705 --from {} --unit 144 fuel_level --json", peer.url)).ok().silently();
+}
+
+#[test]
 fn spacing_is_kept() {
     let peer = Peer::new(|request| request.addresses());
     let started = Instant::now();
@@ -305,6 +344,6 @@ fn a_profile_without_unit_wants_one() {
         .says_in_one_sentence("write --unit N, 1 to 240");
     call(["read", &file, "--from", &peer.url, "fuel_level", "--unit", "2"]).ok();
     call(["read", &file, "--from", &peer.url, "fuel_level", "--unit", "250"])
-        .ok()
-        .mentions("unit 250 is outside 1 to 240");
+        .refuses()
+        .says_in_one_sentence("datakom-d cannot be set to unit 250; write --unit N, 1 to 240");
 }
