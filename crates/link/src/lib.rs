@@ -33,9 +33,9 @@
 //! `echo` stands between it and the rules.
 
 mod clock;
+pub mod command;
 mod doubt;
 mod echo;
-pub mod command;
 mod endpoint;
 mod error;
 mod heard;

@@ -10,18 +10,64 @@ use serde::Serialize;
 use super::{emulate, run};
 use crate::{args, failure::Failure, logging, runtime, terminal};
 
-const KEY: &str = "datakom-d";
-const MODEL: &str = "D-500";
-const UNIT: u8 = 1;
-
 /// Easy to remember for a person's own Modbus tools; any free port when it is taken.
 const USUAL_PORT: u16 = 1502;
+
+/// The serial line of the site: one wire, three units.
+const LINE: &str = "rtu://pty?baud=9600&parity=none&stop=1";
+
+/// One controller of the site.
+struct Member {
+    id: &'static str,
+    name: &'static str,
+    key: &'static str,
+    model: &'static str,
+    unit: u8,
+    /// The maker's name with the model, for people.
+    title: &'static str,
+}
+
+const GENSET: Member = Member {
+    id: "genset-1",
+    name: "Genset 1",
+    key: "datakom-d",
+    model: "D-500",
+    unit: 1,
+    title: "Datakom D-500",
+};
+
+const ON_THE_LINE: [Member; 3] = [
+    Member {
+        id: "genset-2",
+        name: "Genset 2",
+        key: "datakom-dkg705",
+        model: "DKG-705",
+        unit: 1,
+        title: "Datakom DKG-705",
+    },
+    Member {
+        id: "switch-1",
+        name: "Transfer switch",
+        key: "smartgen-hat821si",
+        model: "HAT821SI",
+        unit: 2,
+        title: "SmartGen HAT821SI",
+    },
+    Member {
+        id: "compressor-1",
+        name: "Compressor",
+        key: "smartgen-acc1700",
+        model: "ACC1700CAN",
+        unit: 3,
+        title: "SmartGen ACC1700CAN",
+    },
+];
 
 /// Where to look, as `--json` prints it.
 #[derive(Serialize)]
 struct Shown<'a> {
     page: String,
-    controllers: [Controller<'a>; 1],
+    controllers: Vec<Controller<'a>>,
 }
 
 #[derive(Serialize)]
@@ -37,39 +83,28 @@ pub(crate) fn run(args: &args::Demo, json: bool) -> Result<(), Failure> {
     logging::start("warn")?;
     run::data(args.data.as_deref());
     runtime::service(async |mut stop| {
-        let emulation = imitate().await.map_err(emulate::failure)?;
-        let endpoint = emulation
-            .urls()
-            .first()
-            .ok_or_else(|| Failure::Failed("the imitation has no port".to_owned()))?;
-        let gateway = run::gateway(site(endpoint)?, args.listen).await?;
+        let genset = over_tcp().await.map_err(emulate::failure)?;
+        let line = on_one_line().await.map_err(emulate::failure)?;
+        let (Some(tcp), Some(serial)) = (genset.urls().first(), line.urls().first()) else {
+            return Err(Failure::Failed("the imitations have no port".to_owned()));
+        };
+        let gateway = run::gateway(site(tcp, serial)?, args.listen).await?;
         let page = run::page(gateway.address());
-        if json {
-            let controller = Controller { id: "genset-1", profile: KEY, model: MODEL, endpoint, unit: UNIT };
-            terminal::print_json(&Shown { page, controllers: [controller] })?;
-        } else {
-            let title = terminal::style().title("Busbar demonstration site");
-            terminal::print(&format!(
-                "{title}\n  page        {page}\n  controller  {endpoint}, unit {UNIT}, an imitated Datakom {MODEL}\n  \
-                 by hand     busbar read {KEY} --from {endpoint}\n\nCtrl-C ends it.\n"
-            ))?;
+        match json {
+            true => terminal::print_json(&shown(page, tcp, serial))?,
+            false => terminal::print(&told(&page, tcp, serial))?,
         }
         stop.wait().await;
         gateway.shutdown().await;
-        emulation.stop().await;
+        genset.stop().await;
+        line.stop().await;
         Ok(())
     })
 }
 
-async fn imitate() -> Result<Emulation, StartError> {
-    let config = |port| Config {
-        profile: KEY.to_owned(),
-        unit: UNIT,
-        model: Some(MODEL.to_owned()),
-        listen: vec![Endpoint::Tcp { host: "127.0.0.1".to_owned(), port }],
-        story: true,
-        ..Config::default()
-    };
+async fn over_tcp() -> Result<Emulation, StartError> {
+    let listen = |port| vec![Endpoint::Tcp { host: "127.0.0.1".to_owned(), port }];
+    let config = |port| Config { listen: listen(port), ..imitated(&GENSET) };
     match busbar_emulator::start(config(USUAL_PORT)).await {
         Err(StartError::Listen {
             kind: io::ErrorKind::AddrInUse | io::ErrorKind::PermissionDenied, ..
@@ -78,24 +113,85 @@ async fn imitate() -> Result<Emulation, StartError> {
     }
 }
 
+async fn on_one_line() -> Result<Emulation, StartError> {
+    let line = LINE.parse().map_err(|_| StartError::NoEndpoint)?;
+    busbar_emulator::start_together(ON_THE_LINE.iter().map(imitated).collect(), vec![line]).await
+}
+
+fn imitated(member: &Member) -> Config {
+    Config {
+        profile: member.key.to_owned(),
+        unit: member.unit,
+        model: Some(member.model.to_owned()),
+        story: true,
+        ..Config::default()
+    }
+}
+
+/// Each controller and where it answers.
+fn members<'a>(
+    tcp: &'a Endpoint,
+    serial: &'a Endpoint,
+) -> impl Iterator<Item = (&'static Member, &'a Endpoint)> {
+    std::iter::once((&GENSET, tcp)).chain(ON_THE_LINE.iter().map(move |member| (member, serial)))
+}
+
+fn shown<'a>(page: String, tcp: &'a Endpoint, serial: &'a Endpoint) -> Shown<'a> {
+    let controllers = members(tcp, serial).map(|(member, endpoint)| Controller {
+        id: member.id,
+        profile: member.key,
+        model: member.model,
+        endpoint,
+        unit: member.unit,
+    });
+    Shown { page, controllers: controllers.collect() }
+}
+
+fn told(page: &str, tcp: &Endpoint, serial: &Endpoint) -> String {
+    let mut text = format!("{}\n  page      {page}\n", terminal::style().title("Busbar demonstration site"));
+    for (member, endpoint) in members(tcp, serial) {
+        let Member { title, unit, .. } = member;
+        text += &format!("  imitated  {title:<21}{endpoint}, unit {unit}\n");
+    }
+    // A serial line has one client, and here it is the gateway.
+    text += &format!("  by hand   busbar watch {} --from {tcp}\n\nCtrl-C ends it.\n", GENSET.key);
+    text
+}
+
 /// The site file that a person would write for this.
-fn site(endpoint: &Endpoint) -> Result<Site, Failure> {
-    let text = format!(
+fn site(tcp: &Endpoint, serial: &Endpoint) -> Result<Site, Failure> {
+    let mut text = format!(
         r#"
 [site]
 name = "Demonstration site"
 [server]
 listen = "127.0.0.1:8080"
 [[wires]]
-id = "genset-1"
-endpoint = "{endpoint}"
-[[devices]]
-id = "genset-1"
-name = "Genset 1"
-profile = "{KEY}"
-wire = "genset-1"
-unit = {UNIT}
+id = "network"
+endpoint = "{tcp}"
+[[wires]]
+id = "line"
+endpoint = "{serial}"
 "#
     );
+    for (member, endpoint) in members(tcp, serial) {
+        let Member { id, name, key, unit, .. } = member;
+        let (wire, poll) = match endpoint == serial {
+            // What three units at 9600 baud can keep.
+            true => ("line", "poll = { fast = \"2s\", slow = \"20s\" }"),
+            false => ("network", ""),
+        };
+        text += &format!(
+            r#"
+[[devices]]
+id = "{id}"
+name = "{name}"
+profile = "{key}"
+wire = "{wire}"
+unit = {unit}
+{poll}
+"#
+        );
+    }
     Site::parse("demonstration", &text).map_err(Failure::failed)
 }
