@@ -195,7 +195,12 @@ mod tests {
     }
 
     fn timeout() -> LinkError {
-        LinkError::Timeout { unit: 1, after: Duration::from_secs(1), tries: 2 }
+        LinkError::Timeout {
+            unit: 1,
+            after: Duration::from_secs(1),
+            tries: 2,
+            heard: busbar_link::Heard::Nothing { serial: false },
+        }
     }
 
     #[test]

@@ -146,7 +146,12 @@ pub(crate) fn silence() -> Round {
 }
 
 pub(crate) fn timeout() -> Failure {
-    Failure::Link(LinkError::Timeout { unit: 1, after: Duration::from_secs(1), tries: 2 })
+    Failure::Link(LinkError::Timeout {
+        unit: 1,
+        after: Duration::from_secs(1),
+        tries: 2,
+        heard: busbar_link::Heard::Nothing { serial: false },
+    })
 }
 
 pub(crate) fn outage(cause: Cause) -> Failure {

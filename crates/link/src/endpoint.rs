@@ -141,6 +141,8 @@ pub struct Serial {
     pub parity: Parity,
     /// Stop bits.
     pub stop: StopBits,
+    /// Whether the kernel switches the direction of an RS-485 line, for adapters that do not do so by themselves.
+    pub rs485: bool,
 }
 
 impl Serial {
@@ -177,6 +179,13 @@ impl Serial {
                         _ => return Err(refused("1 or 2")),
                     };
                 }
+                "rs485" => {
+                    serial.rs485 = match value {
+                        "off" => false,
+                        "on" => true,
+                        _ => return Err(refused("off or on")),
+                    };
+                }
                 _ => return Err(EndpointProblem::UnknownKey { key: key.into() }),
             }
         }
@@ -192,18 +201,17 @@ impl Serial {
 /// 9600 baud, no parity, one stop bit.
 impl Default for Serial {
     fn default() -> Self {
-        Self { baud: 9600, parity: Parity::None, stop: StopBits::One }
+        Self { baud: 9600, parity: Parity::None, stop: StopBits::One, rs485: false }
     }
 }
 
 impl fmt::Display for Serial {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let parity = match self.parity {
-            Parity::None => "none",
-            Parity::Even => "even",
-            Parity::Odd => "odd",
-        };
-        write!(f, "baud={}&parity={parity}&stop={}", self.baud, self.stop.count())
+        write!(f, "baud={}&parity={}&stop={}", self.baud, self.parity, self.stop)?;
+        match self.rs485 {
+            true => f.write_str("&rs485=on"),
+            false => Ok(()),
+        }
     }
 }
 
@@ -216,6 +224,16 @@ pub enum Parity {
     Even,
     /// Odd parity.
     Odd,
+}
+
+impl fmt::Display for Parity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "none",
+            Self::Even => "even",
+            Self::Odd => "odd",
+        })
+    }
 }
 
 /// Stop bits of a serial character. Exhaustive: Modbus RTU knows no other.
@@ -233,6 +251,12 @@ impl StopBits {
             Self::One => 1,
             Self::Two => 2,
         }
+    }
+}
+
+impl fmt::Display for StopBits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.count().fmt(f)
     }
 }
 
@@ -293,7 +317,7 @@ pub enum EndpointProblem {
         path: String,
     },
     /// A key in the query that means nothing.
-    #[error("unknown setting \"{key}\"; a serial line has baud, parity and stop")]
+    #[error("unknown setting \"{key}\"; a serial line has baud, parity, stop and rs485")]
     UnknownKey {
         /// The key as it was given.
         key: String,
@@ -395,6 +419,8 @@ mod tests {
             ("tls://10.0.0.7", "tls://10.0.0.7:802"),
             ("rtu:///dev/ttyUSB0", "rtu:///dev/ttyUSB0?baud=9600&parity=none&stop=1"),
             ("rtu:///dev/ttyS1?", "rtu:///dev/ttyS1?baud=9600&parity=none&stop=1"),
+            ("rtu:///dev/ttyS1?rs485=on&baud=4800", "rtu:///dev/ttyS1?baud=4800&parity=none&stop=1&rs485=on"),
+            ("rtu:///dev/ttyS1?rs485=off", "rtu:///dev/ttyS1?baud=9600&parity=none&stop=1"),
             ("rtu://COM3?stop=2", "rtu://COM3?baud=9600&parity=none&stop=2"),
             (
                 "rtu:///dev/serial/by-id/usb-FTDI?parity=even&baud=19200",
@@ -414,7 +440,7 @@ mod tests {
             "rtu:///dev/ttyUSB0?baud=38400&parity=odd&stop=2".parse(),
             Ok(Endpoint::Rtu {
                 path: "/dev/ttyUSB0".into(),
-                serial: Serial { baud: 38400, parity: Parity::Odd, stop: StopBits::Two }
+                serial: Serial { baud: 38400, parity: Parity::Odd, stop: StopBits::Two, rs485: false }
             })
         );
         assert_eq!(
@@ -463,6 +489,7 @@ mod tests {
             ("rtu:///dev/a?baud=0", "baud cannot be \"0\""),
             ("rtu:///dev/a?parity=N", "parity cannot be \"N\"; write none, even or odd"),
             ("rtu:///dev/a?stop=3", "stop cannot be \"3\"; write 1 or 2"),
+            ("rtu:///dev/a?rs485=1", "rs485 cannot be \"1\"; write off or on"),
             ("rtu:///dev/a?stop", "stop cannot be \"\""),
         ] {
             let error = text.parse::<Endpoint>().unwrap_err();

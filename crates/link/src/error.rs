@@ -8,6 +8,8 @@ use busbar_modbus::{ExceptionCode, StartError};
 use thiserror::Error;
 
 use crate::endpoint::Endpoint;
+use crate::heard::Heard;
+use crate::serial::SerialError;
 
 /// Why a request has no result.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -25,9 +27,7 @@ pub enum LinkError {
     },
     /// No answer to a read, however often it was asked. The usual cause: a wrong unit id, or the
     /// device is off.
-    #[error(
-        "unit {unit} did not answer within {after:?}, asked {tries} times: check the unit id and that the device is on"
-    )]
+    #[error("unit {unit} did not answer within {after:?}, asked {tries} times: {heard}")]
     Timeout {
         /// Unit id asked.
         unit: u8,
@@ -35,6 +35,8 @@ pub enum LinkError {
         after: Duration,
         /// How often the request was sent.
         tries: u8,
+        /// What came instead the last time.
+        heard: Heard,
     },
     /// A unit that has not answered for several times is polled only now and then, so that others on its wire keep
     /// their pace; this poll was answered at once, and nothing was sent.
@@ -224,6 +226,14 @@ pub enum Cause {
     /// Bytes came that are no Modbus TCP, and there is no telling where the next frame starts.
     #[error("the peer sent bytes that are no Modbus TCP: check that the port is the right one")]
     Garbage,
+    /// A serial device cannot be opened or set.
+    #[error("{0}")]
+    Serial(SerialError),
+    /// A serial device that was in use is gone. It is opened again when it is back.
+    #[error(
+        "the serial device is gone: check that the adapter is plugged in; it is opened again when it is back"
+    )]
+    Vanished,
     /// Anything else the operating system says.
     #[error("{}", io_sentence(*kind, *code))]
     Io {
@@ -248,7 +258,7 @@ impl From<&io::Error> for Cause {
     }
 }
 
-fn io_sentence(kind: io::ErrorKind, code: Option<i32>) -> String {
+pub(crate) fn io_sentence(kind: io::ErrorKind, code: Option<i32>) -> String {
     match code {
         Some(code) => io::Error::from_raw_os_error(code).to_string(),
         None => kind.to_string(),
@@ -272,7 +282,12 @@ mod tests {
                 "unit 1 answered function 3 with exception 2 (illegal data address)",
             ),
             (
-                LinkError::Timeout { unit: 7, after: Duration::from_millis(1500), tries: 2 },
+                LinkError::Timeout {
+                    unit: 7,
+                    after: Duration::from_millis(1500),
+                    tries: 2,
+                    heard: Heard::Nothing { serial: false },
+                },
                 Fault::Wire,
                 "unit 7 did not answer within 1.5s, asked 2 times: check the unit id and that the device is on",
             ),
@@ -280,6 +295,16 @@ mod tests {
                 LinkError::Silent { unit: 7, next_probe: Duration::from_millis(3500) },
                 Fault::Wire,
                 "unit 7 has not answered lately and is polled again in 3.5s: check the unit id and that the device is on",
+            ),
+            (
+                LinkError::Timeout {
+                    unit: 7,
+                    after: Duration::from_millis(300),
+                    tries: 1,
+                    heard: Heard::Noise { bytes: 5 },
+                },
+                Fault::Wire,
+                "unit 7 did not answer within 300ms, asked 1 times: 5 bytes came that make no frame; check baud rate and parity, the terminators, and that no two devices have one unit id (docs/connect/)",
             ),
             (
                 LinkError::Down { reason: outage(Cause::Refused) },

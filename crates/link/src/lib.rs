@@ -27,20 +27,26 @@
 //!   answer looks the same. The same read may be asked again: either answer is right.
 //!
 //! Inside, `wire` holds every rule as a pure state machine that is given the time; `shared` puts it and the connection
-//! behind one lock; `task` connects and keeps time.
+//! behind one lock; `task` connects and keeps time. `stream` is the connection, whatever it is made of; on RTU wires
+//! `echo` stands between it and the rules.
 
+mod clock;
 mod doubt;
+mod echo;
 mod endpoint;
 mod error;
+mod heard;
 mod job;
 mod line;
 mod link;
 mod options;
 mod port;
 mod queue;
+mod serial;
 mod shared;
 mod silence;
 mod statistics;
+mod stream;
 mod task;
 mod timing;
 mod trace;
@@ -49,8 +55,10 @@ mod wire;
 
 pub use endpoint::{Endpoint, EndpointError, EndpointProblem, Parity, Serial, StopBits};
 pub use error::{Cause, Fault, LinkError, Loss, OpenError, Outage};
+pub use heard::Heard;
 pub use job::{Interrupted, Priority, Write};
 pub use link::{Link, WireState};
 pub use options::{Backoff, Options};
+pub use serial::{SerialError, SerialPort};
 pub use statistics::{Latency, Statistics, UnitState, UnitStatistics};
 pub use trace::{Direction, Trace, TraceEvent};

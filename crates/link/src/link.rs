@@ -50,9 +50,9 @@ impl Link {
 
         let endpoint = Arc::new(endpoint);
         let wire = Wire::new(Arc::clone(&endpoint), line, &options);
-        let shared = Arc::new(Shared::new(wire, options.trace.is_some()));
+        let shared = Arc::new(Shared::new(wire, line, options.trace.is_some()));
         let timeout = options.timeout;
-        runtime.spawn(Task::new(Arc::clone(&shared), Arc::clone(&endpoint), options));
+        runtime.spawn(Task::new(Arc::clone(&shared), Arc::clone(&endpoint), line, options));
         let owner = Arc::new(Owner { shared, endpoint });
         Ok(Self { owner, priority: Priority::Person, timeout, spacing: Duration::ZERO, short: false })
     }

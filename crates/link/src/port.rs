@@ -1,24 +1,23 @@
 //! Where a wire meets the system: the connection and the frame under way.
 
-use std::pin::Pin;
 use std::task::{Context, Poll, ready};
 
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::TcpStream;
+use tokio::io::ReadBuf;
 
 use crate::error::Cause;
+use crate::stream::Stream;
 
 /// A connection that never makes anybody wait: what the system does not take or give at once comes later.
 #[derive(Debug, Default)]
 pub(crate) struct Port {
-    stream: Option<TcpStream>,
+    stream: Option<Stream>,
     /// The request under way; to be written just before `start`.
     pub(crate) frame: Vec<u8>,
     sent: usize,
 }
 
 impl Port {
-    pub(crate) fn open(&mut self, stream: TcpStream) {
+    pub(crate) fn open(&mut self, stream: Stream) {
         self.stream = Some(stream);
     }
 
@@ -31,7 +30,7 @@ impl Port {
     /// Sends a new frame, and says how much of it the system took.
     pub(crate) fn start(&mut self) -> usize {
         // An error shows again when the rest is sent, and is told then.
-        let sent = self.stream.as_ref().map(|stream| stream.try_write(&self.frame));
+        let sent = self.stream.as_mut().map(|stream| stream.try_write(&self.frame));
         self.sent = sent.and_then(Result::ok).unwrap_or(0);
         self.sent
     }
@@ -44,9 +43,9 @@ impl Port {
     /// Sends the rest of the frame.
     pub(crate) fn poll_rest(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Cause>> {
         while let (Some(stream), Some(rest @ [_, ..])) = (&mut self.stream, self.frame.get(self.sent..)) {
-            match ready!(Pin::new(stream).poll_write(cx, rest)) {
+            match ready!(stream.poll_write(cx, rest)) {
                 Ok(bytes) => self.sent += bytes,
-                Err(error) => return Poll::Ready(Err(Cause::from(&error))),
+                Err(cause) => return Poll::Ready(Err(cause)),
             }
         }
         Poll::Ready(Ok(()))
@@ -58,12 +57,10 @@ impl Port {
         cx: &mut Context<'_>,
         space: &mut ReadBuf<'_>,
     ) -> Poll<Result<(), Cause>> {
-        let Some(stream) = &mut self.stream else { return Poll::Pending };
-        Poll::Ready(match ready!(Pin::new(stream).poll_read(cx, space)) {
-            Ok(()) if space.filled().is_empty() => Err(Cause::Closed),
-            Ok(()) => Ok(()),
-            Err(error) => Err(Cause::from(&error)),
-        })
+        match &mut self.stream {
+            Some(stream) => stream.poll_read(cx, space),
+            None => Poll::Pending,
+        }
     }
 }
 
@@ -72,7 +69,7 @@ mod tests {
     use std::future::poll_fn;
 
     use tokio::io::AsyncReadExt;
-    use tokio::net::TcpListener;
+    use tokio::net::{TcpListener, TcpStream};
 
     use super::*;
 
@@ -81,7 +78,7 @@ mod tests {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let stream = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
         let mut port = Port::default();
-        port.open(stream);
+        port.open(Stream::Tcp(stream));
         (port, listener.accept().await.unwrap().0)
     }
 

@@ -6,15 +6,17 @@ use std::task::{Context, Poll, Waker, ready};
 use std::time::Duration;
 
 use tokio::io::ReadBuf;
-use tokio::net::TcpStream;
 use tokio::sync::watch;
 use tokio::time::Instant;
 
+use crate::echo::EchoFilter;
 use crate::error::Cause;
 use crate::job::{Job, Outcome};
+use crate::line::Line;
 use crate::link::WireState;
 use crate::port::Port;
 use crate::queue::{Place, Ticket};
+use crate::stream::Stream;
 use crate::trace::Seen;
 use crate::wire::{Step, Wire};
 
@@ -33,13 +35,14 @@ pub(crate) struct Shared {
 }
 
 impl Shared {
-    pub(crate) fn new(wire: Wire, traced: bool) -> Self {
+    pub(crate) fn new(wire: Wire, line: Line, traced: bool) -> Self {
         Self {
             state: watch::Sender::new(WireState::Connecting),
             opened: Instant::now(),
             guarded: Mutex::new(Guarded {
                 wire,
                 port: Port::default(),
+                echo: line.is_rtu().then(Box::default),
                 reader: None,
                 task: None,
                 alarm: None,
@@ -69,7 +72,7 @@ impl Shared {
         let mut guarded = self.lock();
         let now = self.now();
         let ticket = guarded.wire.submit(now, job, cx.waker())?;
-        guarded.dispatch(cx, now, ticket.place(), &mut wakes);
+        guarded.dispatch(cx, || self.now(), ticket.place(), &mut wakes);
         drop(guarded);
         wakes.into_iter().for_each(Waker::wake);
         Ok(ticket)
@@ -127,6 +130,8 @@ impl Shared {
 pub(crate) struct Guarded {
     pub(crate) wire: Wire,
     port: Port,
+    /// On RTU wires.
+    echo: Option<Box<EchoFilter>>,
     /// The job whose caller is woken for its answer; otherwise the task is, or nobody while nothing is under way.
     reader: Option<Place>,
     /// How to wake the task; it puts a waker here before it sleeps.
@@ -142,8 +147,8 @@ impl Guarded {
     pub(crate) fn turn(
         &mut self,
         cx: &mut Context<'_>,
-        now: Duration,
-        connected: Option<Result<TcpStream, Cause>>,
+        clock: impl Fn() -> Duration,
+        connected: Option<Result<Stream, Cause>>,
         wakes: &mut Vec<Waker>,
     ) -> Step {
         self.reader = None;
@@ -151,11 +156,13 @@ impl Guarded {
             None => {}
             Some(Ok(stream)) => {
                 self.port.open(stream);
-                self.wire.connected(now);
+                self.wire.connected(clock());
             }
-            Some(Err(cause)) => self.wire.refused(now, cause, wakes),
+            Some(Err(cause)) => self.wire.refused(clock(), cause, wakes),
         }
-        self.read_all(cx, now, wakes);
+        self.read_all(cx, &clock, wakes);
+        // Later than what was read: silence is counted from then.
+        let now = clock();
         if self.port.is_blocked() {
             match self.port.poll_rest(cx) {
                 Poll::Ready(Ok(())) => self.wire.sent_rest(),
@@ -193,11 +200,17 @@ impl Guarded {
     }
 
     /// Gets a job that was just taken in on its way, or the task to do so.
-    fn dispatch(&mut self, cx: &mut Context<'_>, now: Duration, place: Place, wakes: &mut Vec<Waker>) {
+    fn dispatch(
+        &mut self,
+        cx: &mut Context<'_>,
+        clock: impl Fn() -> Duration,
+        place: Place,
+        wakes: &mut Vec<Waker>,
+    ) {
         let minded = match self.wire.is_busy() {
             // The task looks into the queue when the exchange ends, if the answer wakes it.
             true => self.reader.take().is_none(),
-            false => self.seen.is_none() && self.start_here(cx, now, place, wakes),
+            false => self.seen.is_none() && self.start_here(cx, clock, place, wakes),
         };
         if !minded {
             wakes.extend(self.task.take());
@@ -208,13 +221,14 @@ impl Guarded {
     fn start_here(
         &mut self,
         cx: &mut Context<'_>,
-        now: Duration,
+        clock: impl Fn() -> Duration,
         place: Place,
         wakes: &mut Vec<Waker>,
     ) -> bool {
         // What lies there answers nothing that is asked now, and it may say that the connection is gone. After this
         // it is the caller who is woken.
-        self.read_all(cx, now, wakes);
+        self.read_all(cx, &clock, wakes);
+        let now = clock();
         let Some(until) = self.wire.start_next(now, &mut self.port.frame, wakes) else {
             return false;
         };
@@ -227,9 +241,13 @@ impl Guarded {
     }
 
     /// Reads for the one exchange that is under way, from its caller's own task.
-    fn read_answer(&mut self, cx: &mut Context<'_>, now: impl Fn() -> Duration, wakes: &mut Vec<Waker>) {
+    fn read_answer(&mut self, cx: &mut Context<'_>, clock: impl Fn() -> Duration, wakes: &mut Vec<Waker>) {
         while self.wire.is_busy() {
-            if self.read(cx, &now, wakes).is_pending() {
+            if self.read(cx, &clock, wakes).is_pending() {
+                if self.wire.ends_by_silence() {
+                    // The task keeps the time.
+                    wakes.extend(self.task.take());
+                }
                 return;
             }
         }
@@ -239,16 +257,21 @@ impl Guarded {
         }
     }
 
-    fn read_all(&mut self, cx: &mut Context<'_>, now: Duration, wakes: &mut Vec<Waker>) {
+    fn read_all(&mut self, cx: &mut Context<'_>, clock: impl Fn() -> Duration, wakes: &mut Vec<Waker>) {
         for _ in 0..READS {
-            if self.read(cx, || now, wakes).is_pending() {
+            if self.read(cx, &clock, wakes).is_pending() {
                 return;
             }
         }
         cx.waker().wake_by_ref();
     }
 
-    fn read(&mut self, cx: &mut Context<'_>, now: impl Fn() -> Duration, wakes: &mut Vec<Waker>) -> Poll<()> {
+    fn read(
+        &mut self,
+        cx: &mut Context<'_>,
+        clock: impl Fn() -> Duration,
+        wakes: &mut Vec<Waker>,
+    ) -> Poll<()> {
         let mut space = [MaybeUninit::uninit(); READ_SPACE];
         let mut space = ReadBuf::uninit(&mut space);
         match ready!(self.port.poll_read(cx, &mut space)) {
@@ -256,17 +279,40 @@ impl Guarded {
                 if let Some(seen) = &mut self.seen {
                     seen.push(Seen::Received(space.filled().to_vec()));
                 }
-                self.wire.received(now(), space.filled(), wakes);
+                self.take_in(clock(), space.filled(), wakes);
             }
-            Err(cause) => self.lost(now(), cause, wakes),
+            Err(cause) => self.lost(clock(), cause, wakes),
         }
         Poll::Ready(())
+    }
+
+    /// Gives what came to the rules, without echoes.
+    fn take_in(&mut self, now: Duration, bytes: &[u8], wakes: &mut Vec<Waker>) {
+        let Some(filter) = &mut self.echo else {
+            return self.wire.received(now, bytes, wakes);
+        };
+        let came = filter.received(bytes);
+        self.wire.heard(now, bytes.len(), came.echo);
+        for bytes in [came.held, came.rest] {
+            if !bytes.is_empty() {
+                self.wire.received(now, bytes, wakes);
+            }
+        }
+        if !self.wire.is_busy() {
+            let held = filter.give_up();
+            if !held.is_empty() {
+                self.wire.received(now, held, wakes);
+            }
+        }
     }
 
     /// Sends the frame, and says whether all of it has left; if not, the task sends the rest.
     fn start(&mut self) -> bool {
         if let Some(seen) = &mut self.seen {
             seen.push(Seen::Sent(self.port.frame.clone()));
+        }
+        if let Some(filter) = &mut self.echo {
+            filter.sent(&self.port.frame);
         }
         let sent = self.port.start();
         let whole = !self.port.is_blocked();
@@ -283,6 +329,9 @@ impl Guarded {
 
     fn close(&mut self) {
         self.port.close();
+        if let Some(filter) = &mut self.echo {
+            filter.give_up();
+        }
         if let Some(seen) = &mut self.seen {
             seen.push(Seen::Closed);
         }

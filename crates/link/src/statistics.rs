@@ -33,6 +33,8 @@ pub struct Statistics {
     pub crc_errors: u64,
     /// Bytes that belong to no frame.
     pub garbage_bytes: u64,
+    /// Our own requests that the adapter or converter sent back (RTU).
+    pub echoes: u64,
     /// Connections made after the first one.
     pub reconnects: u64,
     /// Bytes sent.
@@ -41,8 +43,6 @@ pub struct Statistics {
     pub bytes_received: u64,
     /// Polls of silent units that were answered at once, without a frame.
     pub held: u64,
-    /// Own requests that a converter sent back, and that were taken out of what it sent.
-    pub echoes: u64,
     /// Time from a request to its answer.
     pub latency: Latency,
     /// How long the wire has been open.

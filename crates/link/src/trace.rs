@@ -4,6 +4,8 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
+use busbar_modbus::{Framing, rtu};
+
 const HEADER: usize = 6;
 
 /// A callback that sees every frame of a wire, both ways.
@@ -54,38 +56,66 @@ pub(crate) enum Seen {
     Closed,
 }
 
-/// Cuts what comes in into frames again before it is shown: TCP keeps no boundaries.
+/// Cuts what comes in into frames again before it is shown: neither TCP nor a serial adapter keeps boundaries.
 #[derive(Debug)]
 pub(crate) struct Tracer {
     trace: Trace,
+    framing: Framing,
     pending: Vec<u8>,
+    /// RTU: the request under way, which may come back.
+    asked: Vec<u8>,
 }
 
 impl Tracer {
-    pub(crate) fn new(trace: Trace) -> Self {
-        Self { trace, pending: Vec::new() }
+    pub(crate) fn new(trace: Trace, framing: Framing) -> Self {
+        Self { trace, framing, pending: Vec::new(), asked: Vec::new() }
     }
 
     pub(crate) fn show(&mut self, at: Duration, seen: Seen) {
         match seen {
-            Seen::Sent(bytes) => self.emit(at, Direction::Sent, &bytes),
+            Seen::Sent(bytes) => {
+                if self.framing == Framing::Rtu {
+                    self.flush(at);
+                }
+                self.emit(at, Direction::Sent, &bytes);
+                self.asked = bytes;
+            }
             Seen::Received(bytes) => self.received(at, &bytes),
-            Seen::Closed => self.closed(at),
+            Seen::Closed => self.flush(at),
+        }
+    }
+
+    /// Nothing is under way. On RTU what is left makes no answer; over TCP the rest of a frame may still come.
+    pub(crate) fn ended(&mut self, at: Duration) {
+        if self.framing == Framing::Rtu && !self.asked.is_empty() {
+            self.flush(at);
+            self.asked.clear();
         }
     }
 
     fn received(&mut self, at: Duration, bytes: &[u8]) {
         self.pending.extend_from_slice(bytes);
         let mut start = 0;
-        while let Some(length) = whole_frame(&self.pending[start..]) {
+        while let Some(length) = self.whole(&self.pending[start..]) {
             self.emit(at, Direction::Received, &self.pending[start..start + length]);
             start += length;
         }
         self.pending.drain(..start);
     }
 
+    /// How many bytes to show at once.
+    fn whole(&self, bytes: &[u8]) -> Option<usize> {
+        match self.framing {
+            Framing::Tcp => whole_frame(bytes),
+            Framing::Rtu if !self.asked.is_empty() && bytes.starts_with(&self.asked) => {
+                Some(self.asked.len())
+            }
+            Framing::Rtu => whole_answer(bytes),
+        }
+    }
+
     /// Whatever is left makes no frame any more, and is shown as it is.
-    fn closed(&mut self, at: Duration) {
+    fn flush(&mut self, at: Duration) {
         if !self.pending.is_empty() {
             self.emit(at, Direction::Received, &self.pending);
             self.pending.clear();
@@ -107,20 +137,40 @@ fn whole_frame(bytes: &[u8]) -> Option<usize> {
     Some(HEADER + length).filter(|whole| *whole <= bytes.len())
 }
 
+/// How long the RTU answer is that begins here, once all of it is there and its check sum is right.
+fn whole_answer(bytes: &[u8]) -> Option<usize> {
+    let [_, function, count] = *bytes.first_chunk::<3>()?;
+    let length = match function {
+        0x80.. => 5,
+        1..=4 => 5 + usize::from(count),
+        _ => 8,
+    };
+    bytes.get(..length).filter(|frame| rtu::crc16(frame) == 0).map(|_| length)
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::Mutex;
 
     use super::*;
 
-    fn shown(chunks: &[&[u8]]) -> Vec<(u64, Vec<u8>)> {
-        let seen = Arc::new(Mutex::new(Vec::new()));
+    type Shown = Arc<Mutex<Vec<(u64, Vec<u8>)>>>;
+
+    /// A tracer, and what came in as it shows it.
+    fn tracer(framing: Framing) -> (Tracer, Shown) {
+        let seen = Shown::default();
         let sink = Arc::clone(&seen);
-        let mut tracer = Tracer::new(Trace::new(move |event| {
-            assert_eq!(event.direction, Direction::Received);
-            let mut sink = sink.lock().unwrap();
-            sink.push((event.at.as_millis() as u64, event.bytes.to_vec()));
-        }));
+        let trace = Trace::new(move |event| {
+            if event.direction == Direction::Received {
+                let mut sink = sink.lock().unwrap();
+                sink.push((event.at.as_millis() as u64, event.bytes.to_vec()));
+            }
+        });
+        (Tracer::new(trace, framing), seen)
+    }
+
+    fn shown(chunks: &[&[u8]]) -> Vec<(u64, Vec<u8>)> {
+        let (mut tracer, seen) = tracer(Framing::Tcp);
         for (at, chunk) in (1..).zip(chunks) {
             tracer.show(Duration::from_millis(at), Seen::Received(chunk.to_vec()));
         }
@@ -142,5 +192,37 @@ mod tests {
         );
         assert_eq!(shown(&[&TWO[..7]]), [(99, TWO[..7].to_vec())]);
         assert_eq!(shown(&[b"HTTP/1.1 400", ONE]), [(1, b"HTTP/1.1 400".to_vec()), (2, ONE.to_vec())]);
+    }
+
+    /// What is shown of an RTU exchange that ends at 98.
+    fn shown_on_rtu(asked: &[u8], chunks: &[&[u8]]) -> Vec<(u64, Vec<u8>)> {
+        let (mut tracer, seen) = tracer(Framing::Rtu);
+        tracer.show(Duration::ZERO, Seen::Sent(asked.to_vec()));
+        for (at, chunk) in (1..).zip(chunks) {
+            tracer.show(Duration::from_millis(at), Seen::Received(chunk.to_vec()));
+        }
+        tracer.ended(Duration::from_millis(98));
+        tracer.show(Duration::from_millis(99), Seen::Closed);
+        seen.lock().unwrap().clone()
+    }
+
+    #[test]
+    fn shows_rtu_frames_whole() {
+        let frame = |body: &[u8]| [body, &rtu::crc16(body).to_le_bytes()].concat();
+        let asked = frame(&[1, 3, 0x28, 0x06, 0, 2]);
+        let answer = frame(&[1, 3, 4, 0x08, 0xFE, 0, 0]);
+        let refused = frame(&[1, 0x83, 2]);
+        let echoed = [asked.clone(), answer.clone()].concat();
+        let noisy = [&[0xFF][..], &answer].concat();
+
+        assert_eq!(shown_on_rtu(&asked, &[&answer[..4], &answer[4..]]), [(2, answer.clone())]);
+        assert_eq!(shown_on_rtu(&asked, &[&refused]), [(1, refused.clone())]);
+        assert_eq!(
+            shown_on_rtu(&asked, &[&echoed[..5], &echoed[5..10], &echoed[10..]]),
+            [(2, asked.clone()), (3, answer.clone())]
+        );
+        assert_eq!(shown_on_rtu(&asked, &[&noisy]), [(98, noisy.clone())]);
+        assert_eq!(shown_on_rtu(&asked, &[&answer[..6]]), [(98, answer[..6].to_vec())]);
+        assert_eq!(shown_on_rtu(&[], &[&answer[..6], &answer[6..]]), [(2, answer.clone())]);
     }
 }

@@ -65,8 +65,7 @@ pub(crate) struct Wire {
     unasked_bytes: u64,
     /// Bad checksums and bytes of no frame that were put down to somebody.
     damage: (u64, u64),
-    /// Own requests that came back; the port takes them out.
-    pub(crate) echoes: u64,
+    echoes: u64,
 }
 
 impl Wire {
@@ -157,6 +156,11 @@ impl Wire {
         self.exchange.is_some()
     }
 
+    /// Whether what has come so far may be ended by silence, before the deadline.
+    pub(crate) fn ends_by_silence(&self) -> bool {
+        self.exchange.as_ref().is_some_and(Exchange::ends_by_silence)
+    }
+
     /// The job that is on the wire.
     pub(crate) fn under_way(&self) -> Option<Place> {
         self.exchange.as_ref().map(|exchange| exchange.place)
@@ -196,6 +200,16 @@ impl Wire {
     }
 
     // What the task reports.
+
+    /// RTU: so many bytes were on the line, whatever they are, and how long the echo of our own request is if they end
+    /// one. The line has to be silent after them.
+    pub(crate) fn heard(&mut self, now: Duration, bytes: usize, echo: Option<usize>) {
+        self.echoes += u64::from(echo.is_some());
+        self.earliest = self.earliest.max(now + self.line.silence);
+        if let Some(exchange) = &mut self.exchange {
+            exchange.ear.hears(bytes, echo);
+        }
+    }
 
     /// Bytes came.
     pub(crate) fn received(&mut self, now: Duration, bytes: &[u8], wakes: &mut Vec<Waker>) {

@@ -8,6 +8,7 @@ use busbar_modbus::{Progress, Response, Stray};
 
 use super::{Wire, silent};
 use crate::error::{Cause, LinkError, Loss};
+use crate::heard::Ear;
 use crate::job::{Priority, Question};
 use crate::line::Line;
 use crate::queue::Place;
@@ -39,6 +40,8 @@ pub(super) struct Exchange {
     spacing: Duration,
     started: Duration,
     deadline: Duration,
+    /// What is heard instead of an answer.
+    pub(super) ear: Ear,
     /// When silence will have ended what has come so far, if that does not look like the answer.
     silence: Option<Duration>,
 }
@@ -46,6 +49,11 @@ pub(super) struct Exchange {
 impl Exchange {
     pub(super) fn unit(&self) -> u8 {
         self.question.unit
+    }
+
+    /// Whether silence ends what has come so far.
+    pub(super) fn ends_by_silence(&self) -> bool {
+        self.silence.is_some()
     }
 
     /// Until when its answer may come.
@@ -123,6 +131,7 @@ impl Wire {
             spacing: job.spacing,
             started: now,
             deadline: now + patience,
+            ear: Ear::new(self.client.counters()),
             silence: None,
         });
         Ok(now + patience)
@@ -280,6 +289,7 @@ impl Wire {
             self.doubt(now, &exchange);
         }
         let Exchange { place, timeout: after, tries, .. } = exchange;
+        let heard = exchange.ear.judge(self.line.is_rtu(), self.client.counters());
         let unit = exchange.unit();
         let was_silent = tries == 1 && self.silence.is_silent(unit);
         self.silence.timed_out(unit);
@@ -296,7 +306,7 @@ impl Wire {
             let loss = Loss::TimedOut { after };
             self.queue.finish(place, Err(LinkError::Lost { unit, loss }), wakes);
         } else if !again || !self.retry(&exchange) {
-            self.queue.finish(place, Err(LinkError::Timeout { unit, after, tries }), wakes);
+            self.queue.finish(place, Err(LinkError::Timeout { unit, after, tries, heard }), wakes);
         }
         if dead {
             let requests = self.silence.timeouts();

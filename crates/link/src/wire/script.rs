@@ -6,9 +6,11 @@ use std::task::Wake;
 use super::*;
 use crate::endpoint::Serial;
 use crate::error::Outage;
+use crate::heard::Heard;
 use crate::job::{Ask, Write};
 
 pub(super) const TIMEOUT: u64 = 1000;
+pub(super) const NOTHING: Heard = Heard::Nothing { serial: false };
 const ADDRESS: u16 = 10246;
 
 pub(super) fn ms(millis: u64) -> Duration {

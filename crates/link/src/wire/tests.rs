@@ -94,7 +94,7 @@ fn gives_a_silent_read_up_after_its_retry() {
     assert_eq!(script.step(2000), Step::Wait(None));
     assert_eq!(
         script.outcome(&ticket),
-        Some(Err(LinkError::Timeout { unit: 1, after: ms(TIMEOUT), tries: 2 }))
+        Some(Err(LinkError::Timeout { unit: 1, after: ms(TIMEOUT), tries: 2, heard: NOTHING }))
     );
 }
 
@@ -109,7 +109,8 @@ fn tries_a_silent_unit_once_while_others_answer() {
         }
         script.outcome(&ticket)
     };
-    let timeout = |tries| Some(Err(LinkError::Timeout { unit: 2, after: ms(TIMEOUT), tries }));
+    let timeout =
+        |tries| Some(Err(LinkError::Timeout { unit: 2, after: ms(TIMEOUT), tries, heard: NOTHING }));
     script.read(0);
     script.sends(0);
     script.hears(0, &answer(1));

@@ -1,0 +1,114 @@
+//! Bytes that are no answer: noise, pieces, late and foreign frames. None becomes a value, and each has its sentence.
+
+use busbar_link::{Heard, Link, LinkError};
+
+use crate::slave::*;
+
+/// What is heard when a slave says this, and nothing else, to a read.
+async fn heard(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (Heard, Link) {
+    let line = Line::new();
+    let endpoint = line.endpoint();
+    let slave = line.play(move |line| {
+        let request = line.request();
+        let answer = answer(&request);
+        line.say(&answer);
+    });
+    let link = Link::open(endpoint, quick()).unwrap();
+    let error = read(&link).await.unwrap_err();
+    slave.join().unwrap();
+    let LinkError::Timeout { heard, .. } = error else { panic!("{error}") };
+    (heard, link)
+}
+
+#[tokio::test]
+async fn noise_before_an_answer_does_not_hide_it() {
+    let line = Line::new();
+    let endpoint = line.endpoint();
+    let slave = line.play(|line| {
+        let request = line.request();
+        line.say(&[0x00, 0xFF, 0x80]);
+        line.say(&register(&request, 7));
+        // Glued: what is behind the answer is not taken for the next one.
+        let request = line.request();
+        line.say(&[register(&request, 8), register(&request, 9)].concat());
+        let request = line.request();
+        line.say(&register(&request, 10));
+    });
+    let link = Link::open(endpoint, options()).unwrap();
+    for value in [7, 8, 10] {
+        assert_eq!(read(&link).await, Ok(vec![value]));
+    }
+    let seen = link.statistics();
+    assert_eq!((seen.late, seen.garbage_bytes), (1, 3));
+    slave.join().unwrap();
+}
+
+#[tokio::test]
+async fn what_is_heard_instead_of_an_answer_has_a_name() {
+    let (named, _) = heard(|_| vec![0xFE, 0xF0, 0x80]).await;
+    assert_eq!(named, Heard::Noise { bytes: 3 });
+
+    let (named, _) = heard(|request| register(request, 7)[..4].to_vec()).await;
+    assert_eq!(named, Heard::Noise { bytes: 4 }, "a truncated frame");
+
+    let (named, link) = heard(|request| {
+        let mut damaged = register(request, 7);
+        damaged[3] ^= 0x10;
+        damaged
+    })
+    .await;
+    assert_eq!(named, Heard::BadCrc);
+    assert_eq!(link.statistics().crc_errors, 1);
+
+    let (named, _) = heard(|_| frame(&[2, 3, 2, 0, 7])).await;
+    assert_eq!(named, Heard::OtherUnit);
+
+    let (named, _) = heard(|_| frame(&[UNIT, 3, 4, 0, 7, 0, 8])).await;
+    assert_eq!(named, Heard::Misfit);
+
+    let (named, _) = heard(|_| Vec::new()).await;
+    assert_eq!(named, Heard::Nothing { serial: true });
+}
+
+#[tokio::test]
+async fn noise_inside_a_frame_costs_a_try_and_no_value() {
+    let line = Line::new();
+    let endpoint = line.endpoint();
+    let slave = line.play(|line| {
+        let request = line.request();
+        let mut noisy = register(&request, 7);
+        noisy.insert(3, 0xA5);
+        line.say(&noisy);
+        let request = line.request();
+        line.say(&register(&request, 8));
+    });
+    let link = Link::open(endpoint, options()).unwrap();
+    assert_eq!(read(&link.with_timeout(QUICK)).await, Ok(vec![8]));
+    assert_eq!(link.statistics().retries, 1);
+    slave.join().unwrap();
+}
+
+#[tokio::test]
+async fn a_late_answer_is_counted_and_not_taken() {
+    let line = Line::new();
+    let endpoint = line.endpoint();
+    let (late, hears_late) = std::sync::mpsc::channel::<()>();
+    let slave = line.play(move |line| {
+        let missed = line.request();
+        hears_late.recv().unwrap();
+        line.say(&register(&missed, 66));
+        let (request, _) = line.hear(8);
+        line.say(&register(&request, 7));
+    });
+    let link = Link::open(endpoint, quick()).unwrap();
+    let error = read(&link).await.unwrap_err();
+    assert!(matches!(error, LinkError::Timeout { .. }), "{error}");
+    late.send(()).unwrap();
+    // The wire hears it although nobody asks.
+    while link.statistics().late == 0 {
+        tokio::task::yield_now().await;
+    }
+    let second = link.with_timeout(std::time::Duration::from_secs(30));
+    assert_eq!(second.read_registers(UNIT, 3, ADDRESS + 1, 1).await, Ok(vec![7]));
+    slave.join().unwrap();
+}
