@@ -292,6 +292,11 @@ mod tests {
                 "unit 7 did not answer within 1.5s, asked 2 times: check the unit id and that the device is on",
             ),
             (
+                LinkError::Silent { unit: 7, next_probe: Duration::from_millis(3500) },
+                Fault::Wire,
+                "unit 7 has not answered lately and is polled again in 3.5s: check the unit id and that the device is on",
+            ),
+            (
                 LinkError::Timeout {
                     unit: 7,
                     after: Duration::from_millis(300),
@@ -300,11 +305,6 @@ mod tests {
                 },
                 Fault::Wire,
                 "unit 7 did not answer within 300ms, asked 1 times: 5 bytes came that make no frame; check baud rate and parity, the terminators, and that no two devices have one unit id (docs/connect/)",
-            ),
-            (
-                LinkError::Silent { unit: 7, next_probe: Duration::from_millis(3500) },
-                Fault::Wire,
-                "unit 7 has not answered lately and is polled again in 3.5s: check the unit id and that the device is on",
             ),
             (
                 LinkError::Down { reason: outage(Cause::Refused) },

@@ -244,6 +244,10 @@ impl Guarded {
     fn read_answer(&mut self, cx: &mut Context<'_>, clock: impl Fn() -> Duration, wakes: &mut Vec<Waker>) {
         while self.wire.is_busy() {
             if self.read(cx, &clock, wakes).is_pending() {
+                if self.wire.ends_by_silence() {
+                    // The task keeps the time.
+                    wakes.extend(self.task.take());
+                }
                 return;
             }
         }

@@ -240,6 +240,6 @@ mod tests {
     #[test]
     fn one_record_is_small() {
         // Ten thousand wires with one unit each have one of these each.
-        assert!(size_of::<Unit>() <= 400, "{}", size_of::<Unit>());
+        assert!(size_of::<Unit>() <= 352, "{}", size_of::<Unit>());
     }
 }

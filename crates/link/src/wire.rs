@@ -65,7 +65,6 @@ pub(crate) struct Wire {
     unasked_bytes: u64,
     /// Bad checksums and bytes of no frame that were put down to somebody.
     damage: (u64, u64),
-    /// Own requests that came back; the port takes them out.
     echoes: u64,
 }
 
@@ -155,6 +154,11 @@ impl Wire {
     /// Whether a job that comes now has to wait for an exchange to end first.
     pub(crate) fn is_busy(&self) -> bool {
         self.exchange.is_some()
+    }
+
+    /// Whether what has come so far may be ended by silence, before the deadline.
+    pub(crate) fn ends_by_silence(&self) -> bool {
+        self.exchange.as_ref().is_some_and(Exchange::ends_by_silence)
     }
 
     /// The job that is on the wire.

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use busbar_modbus::{
     Bits, Client, Counters, EncodeError, ExceptionCode, Fault, Framing, Progress, Request, Response,
-    StartError,
+    StartError, Stray,
 };
 use support::{hex, ms};
 
@@ -568,4 +568,22 @@ fn rtu_does_not_broadcast() {
     assert_eq!((out.len(), client.deadline()), (0, None));
     // Over TCP unit 0 is an address like any other.
     assert_eq!(Client::new(Framing::Tcp).start(ms(0), 0, &WRITE, ms(1), &mut out), Ok(()));
+}
+
+#[test]
+fn strays_say_whose_they_were() {
+    let mut client = run(
+        Framing::Tcp,
+        &[
+            Ask(0, READ, "0001 0000 0006 01 03 0020 0002"),
+            // Another unit's exception, then the answer, then one to a transaction long gone.
+            Come(1, "0001 0000 0003 02 83 04", Pending),
+            Come(2, "0001 0000 0007 01 03 04 0001 0002", Answered),
+            Come(3, "FFFF 0000 0005 01 04 02 0001", Pending),
+        ],
+    );
+    let stray = |unit, function, pdu_len, exception| Some(Stray { unit, function, pdu_len, exception });
+    assert_eq!(client.take_stray(), stray(1, 4, 4, false));
+    assert_eq!(client.take_stray(), stray(2, 3, 2, true));
+    assert_eq!(client.take_stray(), None);
 }

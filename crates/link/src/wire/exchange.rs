@@ -39,8 +39,9 @@ pub(super) struct Exchange {
     limit: Duration,
     spacing: Duration,
     started: Duration,
-    pub(super) ear: Ear,
     deadline: Duration,
+    /// What is heard instead of an answer.
+    pub(super) ear: Ear,
     /// When silence will have ended what has come so far, if that does not look like the answer.
     silence: Option<Duration>,
 }
@@ -48,6 +49,11 @@ pub(super) struct Exchange {
 impl Exchange {
     pub(super) fn unit(&self) -> u8 {
         self.question.unit
+    }
+
+    /// Whether silence ends what has come so far.
+    pub(super) fn ends_by_silence(&self) -> bool {
+        self.silence.is_some()
     }
 
     /// Until when its answer may come.
@@ -124,8 +130,8 @@ impl Wire {
             limit,
             spacing: job.spacing,
             started: now,
-            ear: Ear::new(self.client.counters()),
             deadline: now + patience,
+            ear: Ear::new(self.client.counters()),
             silence: None,
         });
         Ok(now + patience)
@@ -282,8 +288,8 @@ impl Wire {
         if self.line.is_rtu() && !is_spent {
             self.doubt(now, &exchange);
         }
-        let heard = exchange.ear.judge(self.line.is_rtu(), self.client.counters());
         let Exchange { place, timeout: after, tries, .. } = exchange;
+        let heard = exchange.ear.judge(self.line.is_rtu(), self.client.counters());
         let unit = exchange.unit();
         let was_silent = tries == 1 && self.silence.is_silent(unit);
         self.silence.timed_out(unit);
