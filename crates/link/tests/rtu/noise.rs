@@ -13,7 +13,7 @@ async fn heard(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (Heard, Li
         let answer = answer(&request);
         line.say(&answer);
     });
-    let link = Link::open(endpoint, quick()).unwrap();
+    let link = open(endpoint, quick()).await;
     let error = read(&link).await.unwrap_err();
     slave.join().unwrap();
     let LinkError::Timeout { heard, .. } = error else { panic!("{error}") };
@@ -100,7 +100,7 @@ async fn a_late_answer_is_counted_and_not_taken() {
         let (request, _) = line.hear(8);
         line.say(&register(&request, 7));
     });
-    let link = Link::open(endpoint, quick()).unwrap();
+    let link = open(endpoint, quick()).await;
     let error = read(&link).await.unwrap_err();
     assert!(matches!(error, LinkError::Timeout { .. }), "{error}");
     late.send(()).unwrap();
