@@ -171,10 +171,12 @@ fn state(unit: &Hat821si, bank: &mut Bank) {
     bank.integer(1093, unit.genset.seconds_left() as i64);
 
     let positions = unit.plant.positions();
-    let steps = unit.loads.each_ref().map(Loads::steps_in);
+    let steps = unit.loads.each_ref().map(Loads::steps);
     let status = match (unit.sequence.is_still(), steps) {
-        (true, [true, _]) => 26,
-        (true, [false, true]) => 28,
+        (true, [Some(Drive::Close), _]) => 26,
+        (true, [Some(Drive::Open), _]) => 27,
+        (true, [None, Some(Drive::Close)]) => 28,
+        (true, [None, Some(Drive::Open)]) => 29,
         _ => unit.sequence.status(positions),
     };
     bank.code(1094, status);
