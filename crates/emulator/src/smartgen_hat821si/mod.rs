@@ -27,6 +27,7 @@ mod genset;
 mod loads;
 mod plant;
 mod render;
+mod section;
 mod source;
 mod story;
 mod transfer;
@@ -111,8 +112,12 @@ impl Hat821si {
         let mut random = Random::new(seed ^ 0x0821_5100);
         let mut past = || Duration::from_secs(random.between(2.0e7, 9.0e7) as u64);
         let source_supply = [past(), past()];
+        let mut plant = Plant::new(seed, NORMAL);
+        for (source, time) in plant.sources.iter_mut().zip(source_supply) {
+            source.has_served(time, random.between(0.6, 0.8));
+        }
         Self {
-            plant: Plant::new(seed, NORMAL),
+            plant,
             passed: Duration::ZERO,
             supervision: [Supervision::new(), Supervision::new()],
             sequence: Sequence::new(),
