@@ -49,6 +49,16 @@ pub enum LinkError {
         /// How long until the next poll goes through, in whole milliseconds.
         next_probe: Duration,
     },
+    /// A serial line was never silent for long enough to ask anything. A write that ends so was not sent.
+    #[error(
+        "nothing was sent to unit {unit}, for the line was not silent within {after:?}; check that no other client asks on this line, baud rate and parity, and the terminators (docs/connect/)"
+    )]
+    NeverSilent {
+        /// Unit id asked.
+        unit: u8,
+        /// How long a silence was waited for.
+        after: Duration,
+    },
     /// There is no connection. A write that ends so was not sent.
     #[error("{reason}")]
     Down {
@@ -107,7 +117,9 @@ impl LinkError {
     pub fn fault(&self) -> Fault {
         match self {
             Self::Exception { .. } => Fault::Device,
-            Self::Timeout { .. } | Self::Silent { .. } | Self::Lost { .. } => Fault::Wire,
+            Self::Timeout { .. } | Self::Silent { .. } | Self::NeverSilent { .. } | Self::Lost { .. } => {
+                Fault::Wire
+            }
             Self::Down { reason } => match reason.cause {
                 Cause::Garbage | Cause::Closed => Fault::Peer,
                 _ => Fault::Wire,
