@@ -27,7 +27,7 @@ pub enum LinkError {
     },
     /// No answer to a read, however often it was asked. The usual cause: a wrong unit id, or the
     /// device is off.
-    #[error("unit {unit} did not answer within {after:?}, asked {tries} times: {heard}")]
+    #[error("unit {unit} did not answer within {after:?}, asked {}: {heard}", times(*tries))]
     Timeout {
         /// Unit id asked.
         unit: u8,
@@ -51,7 +51,7 @@ pub enum LinkError {
     },
     /// A serial line was never silent for long enough to ask anything. A write that ends so was not sent.
     #[error(
-        "nothing was sent to unit {unit}, for the line was not silent within {after:?}; check that no other client asks on this line, baud rate and parity, and the terminators (docs/connect/)"
+        "nothing was sent to unit {unit}, for the line was not silent within {after:?}; check that no other client asks on this line, baud rate and parity, and the terminators"
     )]
     NeverSilent {
         /// Unit id asked.
@@ -151,10 +151,12 @@ pub enum Fault {
 #[non_exhaustive]
 pub enum Loss {
     /// It did not come in time.
-    #[error("none within {after:?}")]
+    #[error("none within {after:?}: {heard}")]
     TimedOut {
         /// How long it was waited for.
         after: Duration,
+        /// What came instead.
+        heard: Heard,
     },
     /// The connection dropped first.
     #[error("{0}")]
@@ -270,6 +272,13 @@ impl From<&io::Error> for Cause {
     }
 }
 
+fn times(tries: u8) -> String {
+    match tries {
+        1 => "once".to_owned(),
+        tries => format!("{tries} times"),
+    }
+}
+
 pub(crate) fn io_sentence(kind: io::ErrorKind, code: Option<i32>) -> String {
     match code {
         Some(code) => io::Error::from_raw_os_error(code).to_string(),
@@ -311,12 +320,17 @@ mod tests {
                     heard: Heard::Noise { bytes: 5 },
                 },
                 Fault::Wire,
-                "unit 7 did not answer within 300ms, asked 1 times: 5 bytes came that make no frame; check baud rate and parity, the terminators, and that no two devices have one unit id (docs/connect/)",
+                "unit 7 did not answer within 300ms, asked once: 5 bytes came that make no frame; check baud rate and parity, the terminators, and that no two devices have one unit id",
             ),
             (
                 LinkError::Silent { unit: 7, next_probe: Duration::from_millis(3500) },
                 Fault::Wire,
                 "unit 7 has not answered lately and is polled again in 3.5s: check the unit id and that the device is on",
+            ),
+            (
+                LinkError::NeverSilent { unit: 7, after: Duration::from_secs(1) },
+                Fault::Wire,
+                "nothing was sent to unit 7, for the line was not silent within 1s; check that no other client asks on this line, baud rate and parity, and the terminators",
             ),
             (
                 LinkError::Down { reason: outage(Cause::Refused) },
@@ -329,9 +343,12 @@ mod tests {
                 "tcp://10.0.0.7:502: the peer sent bytes that are no Modbus TCP: check that the port is the right one",
             ),
             (
-                LinkError::Lost { unit: 1, loss: Loss::TimedOut { after: Duration::from_secs(1) } },
+                LinkError::Lost {
+                    unit: 1,
+                    loss: Loss::TimedOut { after: Duration::from_secs(1), heard: Heard::BadCrc },
+                },
                 Fault::Wire,
-                "the answer to a write to unit 1 was lost (none within 1s); it may have taken effect: read the state before anything else",
+                "the answer to a write to unit 1 was lost (none within 1s: a frame came with a wrong check sum; check baud rate and parity, the terminators, and that no two devices have one unit id); it may have taken effect: read the state before anything else",
             ),
             (
                 LinkError::NotARead { function: 6 },
@@ -353,11 +370,14 @@ mod tests {
             assert_eq!(exception(6, code).may_have_taken_effect(), !nothing_done, "exception {code}");
             assert!(!exception(3, code).may_have_taken_effect(), "a read changes nothing");
         }
-        let lost = LinkError::Lost { unit: 1, loss: Loss::TimedOut { after: Duration::from_secs(1) } };
+        let heard = Heard::Nothing { serial: false };
+        let loss = Loss::TimedOut { after: Duration::from_secs(1), heard };
+        let lost = LinkError::Lost { unit: 1, loss };
         assert!(lost.may_have_taken_effect());
         for error in [
             LinkError::Down { reason: outage(Cause::Refused) },
             LinkError::QueueFull { waiting: 64 },
+            LinkError::NeverSilent { unit: 1, after: Duration::from_secs(1) },
             LinkError::NotSent(StartError::Busy),
             LinkError::Closed,
         ] {

@@ -65,13 +65,7 @@ pub(crate) struct Queue {
 
 impl Queue {
     pub(crate) fn new(capacity: usize) -> Self {
-        Self {
-            slots: Vec::new(),
-            waiting: Default::default(),
-            free: List::default(),
-            probed: None,
-            capacity,
-        }
+        Self { slots: Vec::new(), waiting: Default::default(), free: List::default(), probed: None, capacity }
     }
 
     /// Whether one more job of this priority may wait.

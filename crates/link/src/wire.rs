@@ -76,7 +76,7 @@ pub(crate) struct Wire {
     unasked_bytes: u64,
     /// Bad checksums and bytes of no frame that were put down to somebody.
     damage: (u64, u64),
-    /// Own requests that came back; the port takes them out.
+    /// Own requests that came back and were found on the way in; the client has others.
     echoes: u64,
 }
 
@@ -196,7 +196,7 @@ impl Wire {
             garbage_bytes: seen.garbage_bytes,
             bytes_received: self.unasked_bytes,
             reconnects: self.connections.saturating_sub(1),
-            echoes: self.echoes,
+            echoes: self.echoes + seen.echoes,
             open_for: now,
             ..Statistics::default()
         };
@@ -236,6 +236,21 @@ impl Wire {
         if self.client.fault().is_some() {
             self.hang_up(now, Cause::Garbage, wakes);
         }
+    }
+
+    /// The line echoes, and the request that leaves looks like its confirmation.
+    pub(crate) fn expect_echo(&mut self) {
+        self.client.ignore_echo();
+    }
+
+    /// Answers on this connection.
+    pub(crate) fn answers(&self) -> u64 {
+        self.answers
+    }
+
+    /// When what came is looked at again, if not only at the deadline.
+    pub(crate) fn next_look(&self) -> Option<Duration> {
+        self.exchange.as_ref().and_then(Exchange::next_look)
     }
 
     /// The system took only `bytes` of the request so far.

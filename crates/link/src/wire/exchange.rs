@@ -50,6 +50,11 @@ impl Exchange {
         self.question.unit
     }
 
+    /// When what came is looked at again, if not only at the deadline.
+    pub(super) fn next_look(&self) -> Option<Duration> {
+        self.silence
+    }
+
     /// Until when its answer may come.
     fn horizon(&self) -> Duration {
         let given_up = self.deadline + (self.limit - self.timeout);
@@ -300,7 +305,7 @@ impl Wire {
         // Who was silent before gets one try while others answer.
         let again = !was_silent || dead || !self.has_slots();
         if exchange.question.write {
-            let loss = Loss::TimedOut { after };
+            let loss = Loss::TimedOut { after, heard };
             self.queue.finish(place, Err(LinkError::Lost { unit, loss }), wakes);
         } else if !again || !self.retry(now, &exchange) {
             self.queue.finish(place, Err(LinkError::Timeout { unit, after, tries, heard }), wakes);
