@@ -50,16 +50,17 @@ async fn an_answer_behind_noise_does_not_wait_for_the_deadline() {
     let line = Line::new();
     let endpoint = line.endpoint();
     let slave = line.play(|line| {
-        for value in [7, 8] {
+        // It looks like the beginning of a long answer.
+        let looks_long = [5, 3, 0xF0];
+        for (noise, value) in [(&looks_long[..], 7), (&[], 8), (&looks_long, 9)] {
             let request = line.request();
-            // It looks like the beginning of a long answer.
-            line.say(&[&[5, 3, 0xF0], &register(&request, value)[..]].concat());
+            line.say(&[noise, &register(&request, value)].concat());
         }
     });
     let link = Link::open(endpoint, options()).unwrap();
     wait_until(&link, |state| *state == WireState::Connected).await;
     let soon = Duration::from_secs(10);
-    for value in [7, 8] {
+    for value in [7, 8, 9] {
         // Long enough for the line to be silent: the caller sends and reads by himself.
         tokio::time::sleep(Duration::from_millis(100)).await;
         assert_eq!(tokio::time::timeout(soon, read(&link)).await, Ok(Ok(vec![value])));
