@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use busbar_link::{Heard, Link, LinkError, WireState, Write};
+use busbar_link::{Heard, Link, LinkError, Options, WireState, Write};
 
 use crate::slave::*;
 
@@ -57,7 +57,8 @@ async fn an_answer_behind_noise_does_not_wait_for_the_deadline() {
             line.say(&[noise, &register(&request, value)].concat());
         }
     });
-    let link = Link::open(endpoint, options()).unwrap();
+    let patient = Options { timeout_floor: options().timeout, ..options() };
+    let link = Link::open(endpoint, patient).unwrap();
     wait_until(&link, |state| *state == WireState::Connected).await;
     let soon = Duration::from_secs(10);
     for value in [7, 8, 9] {
