@@ -117,6 +117,11 @@ impl Unit {
         self.missed >= SILENT_AFTER
     }
 
+    /// Whether nobody knows that it will answer: it never has, or not for several times.
+    pub(crate) fn is_doubtful(&self) -> bool {
+        self.is_silent() || self.counts.answers == 0
+    }
+
     /// When it may be asked by somebody who wants this pause between its exchanges.
     pub(crate) fn rested(&self, spacing: Duration) -> Duration {
         match self.counts.requests {

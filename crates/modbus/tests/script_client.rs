@@ -561,6 +561,24 @@ fn rtu_silence_ends_what_hides_the_answer() {
 }
 
 #[test]
+fn rtu_an_echo_is_no_confirmation() {
+    const ASKED: &str = "01 06 00 40 00 10 88 12";
+    let mut client = Client::new(Framing::Rtu);
+    play(&mut client, &[Ask(0, WRITE, ASKED)]);
+    client.ignore_echo();
+    // With noise in front and in pieces: nothing but a second copy confirms it.
+    play(&mut client, &[Come(10, "FF 01 06 00", Pending), Come(12, "40 00 10 88 12", Pending), NoResponse]);
+    play(&mut client, &[Come(30, ASKED, Answered)]);
+    assert_eq!(client.counters(), &counted(|counters| (counters.echoes, counters.garbage_bytes) = (1, 1)));
+
+    // The device may refuse, and the next transaction begins anew.
+    play(&mut client, &[Ask(100, WRITE, ASKED)]);
+    client.ignore_echo();
+    play(&mut client, &[Come(110, "01 86 02 C3 A1", Answered), Ask(200, WRITE, ASKED)]);
+    play(&mut client, &[Come(210, ASKED, Answered)]);
+}
+
+#[test]
 fn rtu_does_not_broadcast() {
     let mut client = Client::new(Framing::Rtu);
     let mut out = Vec::new();
