@@ -27,7 +27,7 @@ pub enum LinkError {
     },
     /// No answer to a read, however often it was asked. The usual cause: a wrong unit id, or the
     /// device is off.
-    #[error("unit {unit} did not answer within {after:?}, asked {tries} times: {heard}")]
+    #[error("unit {unit} did not answer within {after:?}, asked {}: {heard}", times(*tries))]
     Timeout {
         /// Unit id asked.
         unit: u8,
@@ -258,6 +258,13 @@ impl From<&io::Error> for Cause {
     }
 }
 
+fn times(tries: u8) -> String {
+    match tries {
+        1 => "once".to_owned(),
+        tries => format!("{tries} times"),
+    }
+}
+
 pub(crate) fn io_sentence(kind: io::ErrorKind, code: Option<i32>) -> String {
     match code {
         Some(code) => io::Error::from_raw_os_error(code).to_string(),
@@ -299,7 +306,7 @@ mod tests {
                     heard: Heard::Noise { bytes: 5 },
                 },
                 Fault::Wire,
-                "unit 7 did not answer within 300ms, asked 1 times: 5 bytes came that make no frame; check baud rate and parity, the terminators, and that no two devices have one unit id (docs/connect/)",
+                "unit 7 did not answer within 300ms, asked once: 5 bytes came that make no frame; check baud rate and parity, the terminators, and that no two devices have one unit id (docs/connect/)",
             ),
             (
                 LinkError::Silent { unit: 7, next_probe: Duration::from_millis(3500) },
