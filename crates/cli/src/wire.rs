@@ -11,6 +11,9 @@ use crate::{args, failure::Failure, terminal};
 /// Unit ids above which a manual contradicts itself.
 const DOUBTFUL_UNITS: [(&str, u8); 1] = [("datakom-dkg705", 144)];
 
+/// The path of a pseudo-terminal that is still to be made.
+const PTY: &str = "pty";
+
 /// Opens the wire. What the command line leaves open, the profile says; without one the defaults of the link hold.
 ///
 /// Answers may be short where the profile says that the device cuts long reads, and where no profile tells.
@@ -33,6 +36,13 @@ pub(crate) fn open(
         trace: args.trace.then(trace),
         ..defaults
     };
+    if let Endpoint::Rtu { path, .. } = endpoint
+        && path == PTY
+    {
+        return Err(Failure::Call(format!(
+            "{endpoint} is a place to listen for \"busbar emulate\"; write the URL that it prints, as rtu:///dev/pts/3"
+        )));
+    }
     let short = profile.is_none_or(|profile| profile.wire.over_read == OverRead::Truncate);
     Ok(Link::open(endpoint.clone(), options).map_err(Failure::failed)?.with_short_answers(short))
 }
@@ -129,8 +139,15 @@ pub(crate) fn sentence(error: &LinkError, profile: Option<&Profile>) -> String {
                 own.unwrap_or(code.name())
             )
         }
-        _ if is_no_answer(error) => format!("{error}; {}", advice(profile)),
-        _ => error.to_string(),
+        _ => {
+            let text = error.to_string();
+            // Where the link points at the folder, the page is named in its place.
+            match text.strip_suffix(" (docs/connect/)") {
+                Some(text) => format!("{text}; {}", advice(profile)),
+                None if is_no_answer(error) => format!("{text}; {}", advice(profile)),
+                None => text,
+            }
+        }
     }
 }
 
@@ -154,7 +171,7 @@ fn is_no_answer(error: &LinkError) -> bool {
 /// Where it stands what to set at the controller, and what to check on the wire.
 fn advice(profile: Option<&Profile>) -> String {
     match profile.filter(|profile| builtin(&profile.key).is_some()) {
-        Some(profile) => format!("docs/connect/{}.md says what to check", profile.key),
-        None => "docs/connect/ has a page a controller on what to check".to_owned(),
+        Some(profile) => format!("docs/connect/{}.md tells more", profile.key),
+        None => "docs/connect/ has a page for each controller".to_owned(),
     }
 }

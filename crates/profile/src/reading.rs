@@ -110,6 +110,11 @@ impl Point {
         Cow::Owned(format!("unknown ({code})"))
     }
 
+    /// Whether a label of it depends on the model.
+    pub fn depends_on_model(&self) -> bool {
+        self.choices.iter().any(|choice| !choice.by_model.is_empty())
+    }
+
     /// The label of a bit, or `bit 200` where the manual has none.
     pub fn bit_label(&self, bit: u16) -> Cow<'_, str> {
         match self.bit(bit) {

@@ -66,10 +66,9 @@ fn points(profile: &Profile, args: &args::Read) -> Result<Vec<usize>, Failure> {
 
 /// The points and, where a label depends on the model, the one that tells it.
 pub(super) fn with_identity(profile: &Profile, points: &[usize]) -> Vec<usize> {
-    let depends = |point: &Point| point.choices.iter().any(|choice| !choice.by_model.is_empty());
     let mut points = points.to_vec();
     if let Some(identity) = &profile.identity
-        && points.iter().filter_map(|index| profile.points.get(*index)).any(depends)
+        && points.iter().filter_map(|index| profile.points.get(*index)).any(Point::depends_on_model)
     {
         points.push(identity.point);
     }

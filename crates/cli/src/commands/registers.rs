@@ -34,7 +34,7 @@ pub(crate) fn run(args: &args::Registers, json: bool) -> Result<(), Failure> {
         let registers = link
             .read_registers(unit, function, address, count)
             .await
-            .map_err(|error| Failure::Failed(wire::sentence(&error, None) + remedy(&error)))?;
+            .map_err(|error| Failure::Failed(wire::sentence(&error, None) + remedy(&error, function)))?;
         if json {
             terminal::print_json(&Registers { unit, function, address, registers: &registers })?;
         } else {
@@ -52,9 +52,12 @@ pub(crate) fn run(args: &args::Registers, json: bool) -> Result<(), Failure> {
 }
 
 /// What to try when the device is there and refuses.
-fn remedy(error: &LinkError) -> &'static str {
+fn remedy(error: &LinkError, function: u8) -> &'static str {
     match error {
-        LinkError::Exception { code: ExceptionCode::ILLEGAL_FUNCTION, .. } => "; try --function 4, or 3",
+        LinkError::Exception { code: ExceptionCode::ILLEGAL_FUNCTION, .. } if function == 4 => {
+            "; try --function 3"
+        }
+        LinkError::Exception { code: ExceptionCode::ILLEGAL_FUNCTION, .. } => "; try --function 4",
         LinkError::Exception { code: ExceptionCode::ILLEGAL_DATA_ADDRESS, .. } => {
             "; it does not have all of these registers, check ADDRESS and COUNT"
         }

@@ -6,7 +6,7 @@ use std::sync::{
     mpsc::{Receiver, Sender, channel},
 };
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::{
     peer::{Peer, Request},
@@ -135,6 +135,60 @@ fn a_lost_answer_is_sent_once_and_resolved_by_reading() {
 }
 
 #[test]
+fn an_answer_that_cannot_be_the_confirmation_is_lost_and_nothing_is_sent_again() {
+    let answers: [fn(Request) -> Vec<u8>; 5] = [
+        |request| echo(Request { address: request.address + 1, ..request }),
+        |request| echo(Request { count: request.count + 1, ..request }),
+        |request| request.pdu(&[6, 0x20, 0x01]),
+        |request| request.pdu(&[16, 0x20, 0x01, 0, 1]),
+        |request| echo(Request { unit: request.unit + 1, ..request }),
+    ];
+    for answer in answers {
+        let (peer, writes) = unit(move |request, mode| {
+            mode.store(AUTO, Ordering::SeqCst);
+            answer(request)
+        });
+        let call = busbar(&format!("command datakom-d auto --to {} --yes --json --timeout 200ms", peer.url));
+        let report = call.ok().json();
+        assert_eq!(
+            (&report["reason"], &report["sent"]),
+            (&json!("The answer to the write was lost, but Unit mode is AUTO."), &json!(1))
+        );
+        assert_eq!(writes.try_iter().count(), 1);
+    }
+}
+
+#[test]
+fn another_controller_gets_no_write() {
+    let (tell, writes) = channel();
+    let tell = Arc::new(Mutex::new(tell));
+    let peer = Peer::new(move |request| {
+        if !matches!(request.function, 3 | 4) {
+            tell.lock().unwrap().send(request).unwrap();
+        }
+        request.exception(2)
+    });
+    for (key, command) in [
+        ("datakom-d", "stop"),
+        ("datakom-d", "reset"),
+        ("datakom-d", "up"),
+        ("datakom-dkg705", "auto"),
+        ("datakom-dkg705", "set_clock"),
+        ("smartgen-hat821si", "genset_start"),
+        ("smartgen-acc1700", "lock"),
+        ("smartgen-acc1700", "output_1"),
+    ] {
+        let call =
+            busbar(&format!("command {key} {command} --to {} --unit 1 --yes --json --spacing 0", peer.url));
+        let report = call.fails().json();
+        assert_eq!((&report["verdict"], &report["sent"]), (&json!("refused"), &json!(0)), "{report}");
+        let reason = report["reason"].as_str().unwrap();
+        assert!(reason.ends_with(&format!("check the unit id, and that it is a {key}.")), "{reason}");
+    }
+    assert!(writes.try_recv().is_err());
+}
+
+#[test]
 fn what_the_device_refuses_is_refused_in_the_makers_words() {
     let (peer, writes) = unit(|request, _| request.exception(10));
     let call = busbar(&format!("command datakom-d auto --to {} --yes", peer.url)).fails();
@@ -163,7 +217,7 @@ fn who_does_not_answer_gets_nothing() {
     assert_eq!((&report["verdict"], &report["sent"]), (&json!("refused"), &json!(0)));
     let reason = report["reason"].as_str().unwrap();
     assert!(reason.contains("nothing was sent") || reason.starts_with("Nothing was sent"), "{reason}");
-    assert!(reason.ends_with("docs/connect/datakom-d.md says what to check."), "{reason}");
+    assert!(reason.ends_with("docs/connect/datakom-d.md tells more."), "{reason}");
 }
 
 #[test]
@@ -174,11 +228,13 @@ fn ctrl_c_before_the_write_sends_nothing() {
         tell.lock().unwrap().send(request.function).unwrap();
         Vec::new()
     });
-    let arguments = format!("command datakom-d auto --to {} --yes --timeout 60s", peer.url);
+    let arguments = format!("command datakom-d auto --to {} --yes --json --timeout 60s", peer.url);
     let service = Service::start(arguments.split(' '));
     assert_eq!(told.recv(), Ok(3));
-    let (status, err) = service.signal("INT");
+    let (status, out, err) = service.end("INT");
     assert_eq!(status, Some(0), "{err}");
+    let report: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((&report["verdict"], &report["sent"]), (&json!("refused"), &json!(0)), "{report}");
     assert!(err.ends_with("busbar: interrupted: nothing was sent\n"), "{err}");
     assert!(told.try_recv().is_err());
 }
@@ -191,10 +247,12 @@ fn ctrl_c_after_the_write_says_that_it_has_left() {
         let arguments = format!("command datakom-d auto --to {} --yes --json --timeout 60s", peer.url);
         let service = Service::start(arguments.split(' '));
         assert_eq!(writes.recv().unwrap().address, 8193);
-        let (status, err) = service.signal("TERM");
+        let (status, out, err) = service.end("TERM");
         assert_eq!(status, Some(0), "{err}");
         assert!(err.contains("the command has left, is not taken back"), "{err}");
         assert!(writes.try_recv().is_err());
+        let report: Value = serde_json::from_str(&out).unwrap();
+        assert_eq!((&report["verdict"], &report["sent"]), (&json!("unknown"), &json!(1)), "{report}");
     }
 }
 

@@ -13,6 +13,8 @@ mod plan;
 mod profile;
 #[cfg(unix)]
 mod pty;
+#[cfg(target_os = "linux")]
+mod serial;
 mod services;
 mod support;
 mod verdicts;

@@ -188,5 +188,10 @@ fn a_file_that_cannot_be_read_is_one_sentence() {
     call(["profile", "check", &binary.display().to_string()])
         .fails()
         .prints("")
-        .says_in_one_sentence("cannot be read");
+        .says_in_one_sentence("binary.toml is not UTF-8 text: line 1 has other bytes; save it as UTF-8");
+    std::fs::write(&binary, b"format = 1\nkey = \"\xE9\"\n").unwrap();
+    call(["profile", "check", &binary.display().to_string()])
+        .fails()
+        .prints("")
+        .says_in_one_sentence("binary.toml is not UTF-8 text: line 2 has other bytes");
 }

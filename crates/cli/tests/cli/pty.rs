@@ -9,6 +9,7 @@ use std::{
         Arc,
         atomic::{AtomicU16, Ordering},
     },
+    time::Duration,
 };
 
 use rustix::{
@@ -19,7 +20,7 @@ use rustix::{
 
 use crate::{
     peer::Peer,
-    support::{command, d500},
+    support::{Service, command, d500},
 };
 
 /// The binary on a terminal of its own.
@@ -43,6 +44,7 @@ impl Terminal {
         let child = command()
             .args(arguments.split_whitespace())
             .env("TERM", "xterm")
+            .env("TZ", "UTC")
             .stdin(terminal(&slave))
             .stdout(terminal(&slave))
             .stderr(terminal(&slave))
@@ -260,6 +262,44 @@ fn a_command_is_sent_after_a_yes_and_not_after_a_no() {
         assert_eq!(terminal.end(), Some(status), "{command} {answer}: {}", terminal.seen);
         assert!(terminal.seen.contains(said), "{command} {answer}: {}", terminal.seen);
     }
+}
+
+#[test]
+fn the_clock_is_set_to_the_time_of_the_yes() {
+    let mut device = Service::start("emulate datakom-dkg705 --unit 1 --listen tcp://127.0.0.1:0".split(' '));
+    let url = device.line();
+    let mut terminal =
+        Terminal::start(&format!("command datakom-dkg705 set_clock --unit 1 --to {url} --json"), (900, 24));
+    terminal.wait(|seen| seen.ends_with("Send it? [y/N] "));
+    // A person thinks it over: long enough to show.
+    std::thread::sleep(Duration::from_secs(4));
+    terminal.type_line("y");
+    assert_eq!(terminal.end(), Some(0), "{}", terminal.seen);
+    let report = terminal.seen.lines().find(|line| line.starts_with('{')).unwrap();
+    let report: serde_json::Value = serde_json::from_str(report).unwrap();
+    let evidence = report["evidence"].as_array().unwrap();
+    let clock = evidence.iter().find(|seen| seen["id"] == "clock").unwrap();
+    let text = |key: &str| clock[key].as_str().unwrap().to_owned();
+    // Terminals of tests live in UTC.
+    let set: jiff::civil::DateTime = text("after").parse().unwrap();
+    let read: jiff::Timestamp = text("ts").parse().unwrap();
+    let behind = read.duration_since(set.to_zoned(jiff::tz::TimeZone::UTC).unwrap().timestamp());
+    assert!(behind.as_millis() < 3000, "{clock}");
+}
+
+#[test]
+fn an_answer_that_ends_early_is_a_no() {
+    let peer = Peer::new(|_| panic!("nothing is asked before the answer"));
+    let mut terminal = Terminal::start(&format!("command datakom-d stop --to {}", peer.url), (200, 24));
+    terminal.wait(|seen| seen.ends_with("Send it? [y/N] "));
+    // Ctrl-D.
+    terminal.master.write_all(b"\x04").unwrap();
+    assert_eq!(terminal.end(), Some(1), "{}", terminal.seen);
+    assert!(
+        terminal.seen.contains("[y/N] \r\nbusbar: nothing was sent, the answer was no"),
+        "{}",
+        terminal.seen
+    );
 }
 
 #[test]

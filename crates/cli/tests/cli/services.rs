@@ -153,8 +153,19 @@ fn demo_shows_a_site_that_lives() {
 fn demo_tells_people_where_to_look() {
     let mut service = Service::start("demo --listen 127.0.0.1:0".split(' '));
     let text = service.lines_to("Ctrl-C");
-    assert!(text.contains("page        http://127.0.0.1:"), "{text}");
-    assert!(text.contains("busbar read datakom-d --from tcp://127.0.0.1:"), "{text}");
+    assert!(text.contains("page      http://127.0.0.1:"), "{text}");
+    let ends: Vec<&str> = text.lines().filter_map(|line| line.trim().strip_prefix("imitated  ")).collect();
+    let [genset, line @ ..] = ends.as_slice() else { panic!("{text}") };
+    assert!(genset.starts_with("Datakom D-500        tcp://127.0.0.1:"), "{text}");
+    let serial: Vec<_> = line.iter().map(|end| end.split_once("rtu:///dev/pts/").unwrap()).collect();
+    for ((name, url), (expected, unit)) in
+        serial.iter().zip([("Datakom DKG-705", 1), ("SmartGen HAT821SI", 2), ("SmartGen ACC1700CAN", 3)])
+    {
+        assert_eq!(name.trim(), expected, "{text}");
+        assert!(url.ends_with(&format!("?baud=9600&parity=none&stop=1, unit {unit}")), "{text}");
+    }
+    assert_eq!(serial.len(), 3, "{text}");
+    assert!(text.contains("by hand   busbar watch datakom-d --from tcp://127.0.0.1:"), "{text}");
     let (status, err) = service.signal("TERM");
     assert_eq!((status, err.as_str()), (Some(0), ""));
 }

@@ -147,12 +147,21 @@ impl Service {
 
     /// Presses Ctrl-C, or sends another signal, and waits for the exit status.
     #[track_caller]
-    pub(crate) fn signal(mut self, name: &str) -> (Option<i32>, String) {
+    pub(crate) fn signal(self, name: &str) -> (Option<i32>, String) {
+        let (status, _, err) = self.end(name);
+        (status, err)
+    }
+
+    /// The same, with the rest of standard output.
+    #[track_caller]
+    pub(crate) fn end(mut self, name: &str) -> (Option<i32>, String, String) {
         let sent =
             Command::new("kill").args([&format!("-{name}"), &self.child.id().to_string()]).status().unwrap();
         assert!(sent.success());
         let status = self.child.wait().unwrap();
-        (status.code(), self.rest_of_err())
+        let mut out = String::new();
+        self.out.read_to_string(&mut out).unwrap();
+        (status.code(), out, self.rest_of_err())
     }
 
     fn rest_of_err(&mut self) -> String {

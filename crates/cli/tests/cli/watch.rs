@@ -99,7 +99,7 @@ fn who_falls_silent_is_stale_and_who_comes_back_is_good() {
     let (status, err) = service.signal("INT");
     assert_eq!(status, Some(0));
     assert!(err.contains("did not answer within 100ms"), "{err}");
-    assert!(err.contains("docs/connect/datakom-d.md says what to check"), "{err}");
+    assert!(err.contains("docs/connect/datakom-d.md tells more"), "{err}");
     assert!(err.ends_with("busbar: unit 1 answers again\n"), "{err}");
 }
 

@@ -61,6 +61,8 @@ pub struct Report {
     pub evidence: Vec<Observed>,
     /// From the first call to the end.
     pub elapsed: Duration,
+    /// The model of the device, where a label depends on it and a reading told it.
+    pub model: Option<String>,
 }
 
 /// One thing that was looked at, before and after the write.

@@ -16,6 +16,8 @@ pub(super) struct Sight<'p> {
     /// The present reading alone; cleared before each.
     pub(super) image: Image,
     pub(super) observed: Vec<Observed>,
+    /// The model, once a reading told it.
+    pub(super) model: Option<&'p str>,
     /// Raw codes just before the last write, for `changes`.
     before: Vec<(Subject, Option<u32>)>,
 }
@@ -23,7 +25,15 @@ pub(super) struct Sight<'p> {
 impl<'p> Sight<'p> {
     pub(super) fn new(profile: &'p Profile, arguments: Arguments, order: WordOrder) -> Self {
         let image = Image::new(profile);
-        Self { profile, arguments, order, image, observed: Vec::new(), before: Vec::new() }
+        Self { profile, arguments, order, image, observed: Vec::new(), model: None, before: Vec::new() }
+    }
+
+    /// Keeps the model that the present reading tells.
+    pub(super) fn learn_model(&mut self) {
+        let Some(identity) = &self.profile.identity else { return };
+        let code = self.code(Subject::Point { point: identity.point, bit: None }, Duration::ZERO);
+        let model = code.and_then(|code| self.profile.model(u16::try_from(code).ok()?));
+        self.model = model.or(self.model);
     }
 
     /// The number of an argument after its time has run on by `later`.

@@ -23,7 +23,7 @@ pub(super) fn name(profile: &Profile, sign: Sign) -> Cow<'_, str> {
 }
 
 /// What was seen of a sign.
-pub(super) fn seen(profile: &Profile, sign: Sign, seen: Option<Seen>) -> String {
+pub(super) fn seen(profile: &Profile, model: Option<&str>, sign: Sign, seen: Option<Seen>) -> String {
     match (seen, sign) {
         (None, _) => "without a value".to_owned(),
         (Some(Seen::Number(number)), Sign::Point { point, .. }) => {
@@ -36,7 +36,7 @@ pub(super) fn seen(profile: &Profile, sign: Sign, seen: Option<Seen>) -> String 
         }
         (Some(Seen::Number(number)), _) => number.to_string(),
         (Some(Seen::Code(code)), Sign::Point { point, .. }) => {
-            profile.points[point].label(code, None).into_owned()
+            profile.points[point].label(code, model).into_owned()
         }
         (Some(Seen::Code(code)), _) => code.to_string(),
         (Some(Seen::Bit(bit)), _) => on_off(bit).to_owned(),
@@ -49,12 +49,13 @@ pub(super) fn seen(profile: &Profile, sign: Sign, seen: Option<Seen>) -> String 
 /// What a condition asks for.
 pub(super) fn wanted(
     profile: &Profile,
+    model: Option<&str>,
     condition: &Condition,
     arg: impl Fn(ArgRef) -> Option<u16>,
 ) -> String {
     let code = |code: u32| match condition.subject {
         Subject::Point { bit: Some(_), .. } => on_off(code == 1).to_owned(),
-        Subject::Point { point, bit: None } => raw(&profile.points[point], code),
+        Subject::Point { point, bit: None } => raw(&profile.points[point], model, code),
         Subject::Arg(_) => code.to_string(),
     };
     match &condition.test {
@@ -66,9 +67,9 @@ pub(super) fn wanted(
     }
 }
 
-fn raw(point: &Point, code: u32) -> String {
+fn raw(point: &Point, model: Option<&str>, code: u32) -> String {
     if point.data_type == DataType::Choice {
-        return point.label(code, None).into_owned();
+        return point.label(code, model).into_owned();
     }
     if point.hex { format!("{code:04X}h") } else { code.to_string() }
 }

@@ -104,6 +104,35 @@ fn silence_before_the_write_sends_nothing() {
 }
 
 #[test]
+fn who_refuses_the_reading_may_be_another_device_and_gets_nothing() {
+    for (key, command, code) in [
+        ("datakom-d", "stop", "2 (illegal address)"),
+        ("datakom-d", "up", "2 (illegal address)"),
+        ("datakom-d", "reset", "10 (write protection)"),
+        ("datakom-dkg705", "auto", "2 (illegal address)"),
+        ("smartgen-hat821si", "genset_start", "2 (illegal data address)"),
+        ("smartgen-acc1700", "lock", "1 (illegal function)"),
+        ("smartgen-acc1700", "output_1", "2 (illegal data address)"),
+    ] {
+        let number = code.split(' ').next().unwrap();
+        let script = format!(
+            "read exception {number}
+             refused 0 Nothing was sent: the device refuses the reading that comes before it with exception {code}; \
+             check the unit id, and that it is a {key}."
+        );
+        play(key, command, &[], &script);
+    }
+    // Nor does a silent one, even where nothing would show what came of the write.
+    play(
+        "datakom-d",
+        "up",
+        &[],
+        "read silent
+         refused 0 Nothing was sent: the device does not answer the reading that comes before it.",
+    );
+}
+
+#[test]
 fn an_exception_refuses_and_one_look_follows() {
     play(
         "datakom-d",
@@ -181,19 +210,19 @@ fn somebody_at_the_panel_is_told() {
          read unit_mode=2
          read* unit_mode=1
          no_effect 1 The device acknowledged the write, but Unit operation status stayed Genset at rest for 10 s; Unit mode was \
-         MANUAL / RUN and is STOP by now.",
+         RUN and is STOP by now.",
     );
 }
 
 #[test]
 fn the_run_key_depends_on_the_model() {
-    for (code, key) in [(0xD500, 2), (0xD545, 2), (0xD700, 16)] {
+    for (code, key, label) in [(0xD500, 2, "RUN"), (0xD545, 2, "RUN"), (0xD700, 16, "MANUAL")] {
         let script = format!(
             "read device_identity={code} unit_mode=1
              write 6 8193 {key} ack
              read unit_mode=2
              read operation_status=1
-             done 1 Unit mode is MANUAL / RUN, Unit operation status is Wait before fuel."
+             done 1 Unit mode is {label}, Unit operation status is Wait before fuel."
         );
         play("datakom-d", "run", &[], &script);
     }
@@ -209,7 +238,8 @@ fn the_run_key_depends_on_the_model() {
         "manual",
         &[],
         "read exception 2
-         refused 0 Nothing was sent: Device identity could not be read, and the value depends on it.",
+         refused 0 Nothing was sent: the device refuses the reading that comes before it with exception 2 (illegal address); \
+         check the unit id, and that it is a datakom-d.",
     );
 }
 
@@ -234,7 +264,8 @@ fn a_breaker_key_is_proved_by_a_change() {
         "gcb",
         &[],
         "read exception 2
-         refused 0 Nothing was sent: Genset contactor could not be read, and the command depends on it.",
+         refused 0 Nothing was sent: the device refuses the reading that comes before it with exception 2 (illegal address); \
+         check the unit id, and that it is a datakom-d.",
     );
 }
 
@@ -244,28 +275,32 @@ fn a_key_without_proof_is_unknown() {
         "datakom-d",
         "up",
         &[("press", "very_long")],
-        "write 6 8193 0x8200 ack
+        "read
+         write 6 8193 0x8200 ack
          unknown 1 The device acknowledged the write, and no register shows what a menu or arrow key did.",
     );
     play(
         "datakom-d",
         "up",
         &[],
-        "write 6 8193 0x0200 lost
+        "read
+         write 6 8193 0x0200 lost
          unknown 1 The answer to the write was lost, and no register shows what a menu or arrow key did.",
     );
     play(
         "datakom-d",
         "up",
         &[],
-        "write 6 8193 0x0200 exception 2
+        "read
+         write 6 8193 0x0200 exception 2
          refused 1 The device refused the write with exception 2 (illegal address).",
     );
     play(
         "datakom-d",
         "up",
         &[],
-        "write 6 8193 0x0200 unsent
+        "read
+         write 6 8193 0x0200 unsent
          refused 0 Nothing was sent: the write did not leave, the wire is down.",
     );
 }
@@ -328,7 +363,8 @@ fn a_toggle_looks_first() {
         "load",
         &[],
         "read exception 2
-         refused 0 Nothing was sent: Load indicator could not be read, and the command depends on it.",
+         refused 0 Nothing was sent: the device refuses the reading that comes before it with exception 2 (illegal data address); \
+         check the unit id, and that it is a smartgen-acc1700.",
     );
     play(
         "smartgen-acc1700",

@@ -52,6 +52,10 @@ impl Question {
             io::stdin().read_line(&mut line).map(|_| line)
         });
         let answer = answer.await.ok().and_then(Result::ok).unwrap_or_default();
+        if !answer.ends_with('\n') {
+            // Ctrl-D leaves the cursor behind the question.
+            terminal::error_text("\n");
+        }
         if is_yes(answer.trim(), self.word.as_deref()) {
             return Ok(());
         }

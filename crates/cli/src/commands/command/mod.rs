@@ -3,11 +3,11 @@
 mod consent;
 mod teller;
 
-use std::pin::pin;
+use std::{pin::pin, time::Duration};
 
-use busbar_link::{Link, command as driver};
+use busbar_link::command as driver;
 use busbar_profile::{
-    Command, DateTime, Point, Profile,
+    Command, DateTime, Profile,
     command::{ArgValues, Arguments, Observed, ObservedShow, Report, Run, Seen, SeenShow, Sign, Verdict},
 };
 use jiff::{SignedDuration, Timestamp, Zoned};
@@ -44,7 +44,7 @@ struct Evidence<'a> {
 pub(crate) fn run(args: &args::Order, json: bool) -> Result<(), Failure> {
     let profile = profiles::resolve(&args.key)?;
     let command = profiles::command(&profile, &args.name, &args.key)?;
-    let arguments = arguments(&profile, command, args)?;
+    arguments(&profile, command, args)?;
     let unit = wire::unit(&profile, args.unit)?;
     wire::check_line(&profile, &args.to)?;
     let question = match args.yes {
@@ -56,11 +56,13 @@ pub(crate) fn run(args: &args::Order, json: bool) -> Result<(), Failure> {
             select! {
                 answer = question.ask() => answer?,
                 () = stop.wait() => {
-                    terminal::message("nothing was sent");
-                    return Ok(());
+                    terminal::error_text("\n");
+                    return interrupted(command, 0, Duration::ZERO, json);
                 }
             }
         }
+        // A time of now is now, however long the question waited.
+        let arguments = self::arguments(&profile, command, args)?;
         let link = wire::open(&args.to, &args.wire, Some(&profile))?;
         let order = args.wire.word_order.unwrap_or(profile.wire.word_order);
         let run = Run::new(&profile, command, arguments, order);
@@ -75,14 +77,13 @@ pub(crate) fn run(args: &args::Order, json: bool) -> Result<(), Failure> {
             }
         };
         let Some(mut report) = report else {
-            teller.interrupted();
-            return Ok(());
+            let elapsed = Timestamp::now().duration_since(started).unsigned_abs();
+            return interrupted(command, teller.sent(), elapsed, json);
         };
         if let (true, Some(why)) = (report.verdict != Verdict::Done, teller.unread()) {
             report.reason.push_str(&format!(" {why}."));
         }
-        let model = model(&link, &profile, unit, &report).await;
-        tell(&profile, command, &report, started, model.as_deref(), json)
+        tell(&profile, command, &report, started, json)
     })
 }
 
@@ -116,21 +117,32 @@ fn local_time(now: &Zoned) -> Option<DateTime> {
     )
 }
 
-/// The model of the unit, where a label in the evidence depends on it and the unit still answers.
-async fn model(link: &Link, profile: &Profile, unit: u8, report: &Report) -> Option<String> {
-    let depends = |observed: &Observed| match observed.sign {
-        Sign::Point { point, .. } => {
-            profile.points[point].choices.iter().any(|choice| !choice.by_model.is_empty())
-        }
-        _ => false,
+/// Ctrl-C: what has left cannot be taken back, and programs get a document all the same.
+fn interrupted(command: &Command, sent: u32, elapsed: Duration, json: bool) -> Result<(), Failure> {
+    let (verdict, message, reason) = match sent {
+        0 => (Verdict::Refused, "interrupted: nothing was sent", "Nothing was sent: it was interrupted."),
+        _ => (
+            Verdict::Unknown,
+            "interrupted: the command has left, is not taken back and may still take effect; read the state before anything else",
+            "It was interrupted after the write had left, before anything showed what became of it.",
+        ),
     };
-    if report.verdict == Verdict::Unknown || !report.evidence.iter().any(depends) {
-        return None;
+    terminal::message(message);
+    if json {
+        terminal::print_json(&Outcome {
+            command: &command.id,
+            verdict,
+            reason,
+            sent,
+            evidence: Vec::new(),
+            elapsed_ms: millis(elapsed),
+        })?;
     }
-    let Point { address, registers, .. } = profile.points[profile.identity.as_ref()?.point];
-    let function = profile.wire.read_function();
-    let registers = link.read_registers(unit, function, address, registers).await.ok()?;
-    profiles::model(profile, |_| Some(&registers)).map(str::to_owned)
+    Ok(())
+}
+
+fn millis(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
 }
 
 /// Prints the verdict; anything but `done` is a failure.
@@ -139,9 +151,9 @@ fn tell(
     command: &Command,
     report: &Report,
     started: Timestamp,
-    model: Option<&str>,
     json: bool,
 ) -> Result<(), Failure> {
+    let model = report.model.as_deref();
     if json {
         let evidence = report.evidence.iter().map(|observed| {
             let after = SignedDuration::try_from(observed.at).unwrap_or_default();
@@ -154,7 +166,7 @@ fn tell(
             reason: &report.reason,
             sent: report.sent,
             evidence: evidence.collect(),
-            elapsed_ms: u64::try_from(report.elapsed.as_millis()).unwrap_or(u64::MAX),
+            elapsed_ms: millis(report.elapsed),
         })?;
     } else {
         terminal::print(&text(profile, command, report, model))?;

@@ -20,18 +20,10 @@ pub(super) struct Teller<'a> {
     reading: (Vec<usize>, u32),
     /// Why the last reading has no answer.
     unread: Option<String>,
-    write: Write,
-}
-
-/// How far the writes are.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Write {
-    /// None has left.
-    None,
-    /// One is with the wire, which had sent so many frames by then; whether one had left before.
-    Handed { requests: u64, before: bool },
-    /// At least one has left.
-    Left,
+    /// Writes that have left and are over.
+    left: u32,
+    /// A write is with the wire, which had sent so many frames by then.
+    handed: Option<u64>,
 }
 
 impl<'a> Teller<'a> {
@@ -45,7 +37,8 @@ impl<'a> Teller<'a> {
             told: Default::default(),
             reading: (Vec::new(), 0),
             unread: None,
-            write: Write::None,
+            left: 0,
+            handed: None,
         }
     }
 
@@ -53,24 +46,27 @@ impl<'a> Teller<'a> {
         match progress {
             Progress::Reading { points, sent } => self.reads(points, sent),
             Progress::NotRead { error } => {
-                self.unread = match error {
-                    LinkError::Exception { .. } => None,
-                    _ => Some(wire::sentence(error, Some(self.profile))),
-                };
-                self.say("no answer yet".to_owned());
+                let why = wire::sentence(error, Some(self.profile));
+                match error {
+                    LinkError::Exception { .. } => self.say(why),
+                    _ => {
+                        self.say("no answer yet".to_owned());
+                        self.unread = Some(why);
+                    }
+                }
             }
             Progress::Writing { step, frame } => {
-                let before = self.write == Write::Left;
-                self.write = Write::Handed { requests: self.link.statistics().requests, before };
+                self.handed = Some(self.link.statistics().requests);
                 self.say(self.sending(step, frame));
             }
             Progress::Confirmed => {
-                self.write = Write::Left;
+                self.handed = None;
+                self.left += 1;
                 self.say("the controller confirmed it".to_owned());
             }
             Progress::NotConfirmed { error } => {
-                let left = matches!(error, LinkError::Lost { .. } | LinkError::Exception { .. });
-                self.write = if left || self.has_left() { Write::Left } else { Write::None };
+                self.handed = None;
+                self.left += u32::from(matches!(error, LinkError::Lost { .. } | LinkError::Exception { .. }));
                 self.say(wire::sentence(error, Some(self.profile)));
             }
             _ => {}
@@ -91,22 +87,10 @@ impl<'a> Teller<'a> {
         }
     }
 
-    /// It was interrupted: what has left cannot be taken back.
-    pub(super) fn interrupted(&self) {
-        terminal::message(match self.has_left() {
-            true => {
-                "interrupted: the command has left, is not taken back and may still take effect; read the state before anything else"
-            }
-            false => "interrupted: nothing was sent",
-        });
-    }
-
-    fn has_left(&self) -> bool {
-        match self.write {
-            Write::None => false,
-            Write::Handed { requests, before } => before || self.link.statistics().requests > requests,
-            Write::Left => true,
-        }
+    /// How many writes have left by now. Exact once the command under way was dropped.
+    pub(super) fn sent(&self) -> u32 {
+        let leaving = self.handed.is_some_and(|requests| self.link.statistics().requests > requests);
+        self.left + u32::from(leaving)
     }
 
     fn reads(&mut self, points: &[usize], sent: u32) {

@@ -242,9 +242,13 @@ impl<'p> Run<'p> {
             return;
         }
         let unanswered = matches!(outcome, Err(ReadFailure::Silent | ReadFailure::Down));
+        self.sight.learn_model();
         match self.stage {
             Stage::Before if unanswered => self.unread_before(now),
-            Stage::Before => self.look_before(now),
+            Stage::Before => match outcome {
+                Err(ReadFailure::Exception(code)) if self.is_foreign() => self.foreign(now, code),
+                _ => self.look_before(now),
+            },
             Stage::After => self.look_after(now, unanswered),
             Stage::Refused(code) => self.look_back(now, code),
         }
@@ -341,6 +345,10 @@ impl<'p> Run<'p> {
                 proofs.retain(|proof| changes(&proof.what).is_some());
             }
         }
+        if self.stage == Stage::Before && self.step == 0 && points.is_empty() && proofs.is_empty() {
+            // Nobody is commanded unseen, even where nothing will show what came of it.
+            points.extend(probe(self.sight.profile));
+        }
         for proof in proofs {
             match &proof.what {
                 Evidence::Point(condition) => points.extend(point_of(condition)),
@@ -349,6 +357,12 @@ impl<'p> Run<'p> {
                 }
                 Evidence::Device(_) => points.extend(probe(self.sight.profile)),
             }
+        }
+        if self.stage == Stage::Before
+            && let Some(identity) = &self.sight.profile.identity
+            && points.iter().any(|point| self.sight.profile.points[*point].depends_on_model())
+        {
+            points.push(identity.point);
         }
         points.sort_unstable();
         points.dedup();
@@ -413,6 +427,12 @@ impl<'p> Run<'p> {
             }
         }
         self.phase = Phase::Ready { read_at: now };
+    }
+
+    /// Whether the device has none of what a device of this profile has: it may be another one, so it gets no write.
+    fn is_foreign(&self) -> bool {
+        let unread = |point: &usize| self.sight.image.registers(*point).is_none();
+        self.sent == 0 && self.points().iter().all(unread)
     }
 
     fn failed(&self, conditions: &'p [Condition], later: Duration) -> Option<&'p Condition> {

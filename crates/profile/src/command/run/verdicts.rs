@@ -94,7 +94,7 @@ impl Run<'_> {
             return self.finish(now, Verdict::Unknown, &reason);
         };
         let (before, after) = (record.before, record.after);
-        let is = words::seen(self.sight.profile, sign, after);
+        let is = words::seen(self.sight.profile, self.sight.model, sign, after);
         let name = self.name(sign);
         let what = if matches!(goal.what, Evidence::Clock { .. }) {
             format!("{name} is {is}, not the time that was asked for")
@@ -103,11 +103,11 @@ impl Run<'_> {
         } else if before.is_none() {
             format!("{name} is {is} after {within} s")
         } else {
-            let was = words::seen(self.sight.profile, sign, before);
+            let was = words::seen(self.sight.profile, self.sight.model, sign, before);
             let wanted = match &goal.what {
                 Evidence::Point(condition) => {
                     let arg = |arg| self.sight.number(arg, self.written);
-                    format!(", not {}", words::wanted(self.sight.profile, condition, arg))
+                    format!(", not {}", words::wanted(self.sight.profile, self.sight.model, condition, arg))
                 }
                 _ => String::new(),
             };
@@ -126,9 +126,10 @@ impl Run<'_> {
             let Some(sign) = sign_of(condition.subject) else { continue };
             let now = self.sight.seen(sign);
             if now.is_some() && self.sight.holds(condition, self.written) == Some(false) {
-                let wanted =
-                    words::wanted(self.sight.profile, condition, |arg| self.sight.number(arg, self.written));
-                let is = words::seen(self.sight.profile, sign, now);
+                let wanted = words::wanted(self.sight.profile, self.sight.model, condition, |arg| {
+                    self.sight.number(arg, self.written)
+                });
+                let is = words::seen(self.sight.profile, self.sight.model, sign, now);
                 text.push_str(&format!("; {} was {wanted} and is {is} by now", self.name(sign)));
             }
         }
@@ -152,8 +153,21 @@ impl Run<'_> {
             Some(seen) => self.state(sign, Some(seen)),
             None => format!("{} could not be read", self.name(sign)),
         };
-        let wanted = words::wanted(self.sight.profile, condition, |arg| self.sight.number(arg, later));
+        let wanted = words::wanted(self.sight.profile, self.sight.model, condition, |arg| {
+            self.sight.number(arg, later)
+        });
         self.give_up(now, &format!("{state}, and must be {wanted}"));
+    }
+
+    /// The device refused every reading before the first write.
+    pub(super) fn foreign(&mut self, now: Duration, code: u8) {
+        let profile = self.sight.profile;
+        let exception = words::exception(profile, code);
+        let why = format!(
+            "the device refuses the reading that comes before it with {exception}; check the unit id, and that it is a {}",
+            profile.key
+        );
+        self.give_up(now, &why);
     }
 
     pub(super) fn unreadable(&mut self, now: Duration, conditions: &[Condition]) {
@@ -196,6 +210,7 @@ impl Run<'_> {
             sent: self.sent,
             evidence: std::mem::take(&mut self.sight.observed),
             elapsed: self.later(now),
+            model: self.sight.model.map(str::to_owned),
         });
     }
 
@@ -214,7 +229,7 @@ impl Run<'_> {
     }
 
     fn state(&self, sign: Sign, seen: Option<Seen>) -> String {
-        format!("{} is {}", self.name(sign), words::seen(self.sight.profile, sign, seen))
+        format!("{} is {}", self.name(sign), words::seen(self.sight.profile, self.sight.model, sign, seen))
     }
 
     fn name(&self, sign: Sign) -> String {
