@@ -35,6 +35,7 @@ mod transfer;
 use std::time::Duration;
 
 use busbar_modbus::ExceptionCode;
+use busbar_profile::DateTime;
 
 use crate::bank::Bank;
 use crate::panel::Panel;
@@ -82,6 +83,8 @@ const HORN: Duration = Duration::from_secs(30);
 pub(crate) struct Hat821si {
     plant: Plant,
     passed: Duration,
+    /// What the calendar said at power-on.
+    epoch: DateTime,
     supervision: [Supervision; 2],
     sequence: Sequence,
     loads: [Loads; 2],
@@ -137,7 +140,13 @@ impl Hat821si {
             load_supply: source_supply.map(|own| SupplyTime::new(own, &mut random)),
             story,
             scene: Scene::NOTHING,
+            epoch: DateTime::FIRST,
         }
+    }
+
+    /// The same controller with its calendar set.
+    pub(crate) fn starting(self, epoch: DateTime) -> Self {
+        Self { epoch, ..self }
     }
 
     fn available(&self) -> [bool; 2] {

@@ -267,7 +267,7 @@ fn inputs_and_outputs(unit: &Hat821si, bank: &mut Bank) {
 }
 
 fn counters(unit: &Hat821si, bank: &mut Bank) {
-    for (address, part) in (1100..).zip(calendar(unit.passed)) {
+    for (address, part) in (1100..).zip(calendar(unit.epoch.plus(unit.passed))) {
         bank.integer(address, part);
     }
     let [load_1, load_2] = &unit.load_supply;
