@@ -132,10 +132,10 @@ pub enum UnitState {
 /// How long answers took.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
-    count: u64,
-    total: Duration,
-    min: Duration,
-    max: Duration,
+    // Nanoseconds: each unit of each wire has these.
+    total: u64,
+    min: u64,
+    max: u64,
     buckets: [u64; Self::BOUNDS.len() + 1],
 }
 
@@ -158,23 +158,22 @@ impl Latency {
 
     /// How many answers were measured.
     pub fn count(&self) -> u64 {
-        self.count
+        self.buckets.iter().sum()
     }
 
     /// The shortest; none before the first answer.
     pub fn min(&self) -> Option<Duration> {
-        (self.count > 0).then_some(self.min)
+        (self.count() > 0).then_some(Duration::from_nanos(self.min))
     }
 
     /// The mean; none before the first answer.
     pub fn mean(&self) -> Option<Duration> {
-        let nanos = self.total.as_nanos().checked_div(u128::from(self.count))?;
-        Some(Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX)))
+        self.total.checked_div(self.count()).map(Duration::from_nanos)
     }
 
     /// The longest; none before the first answer.
     pub fn max(&self) -> Option<Duration> {
-        (self.count > 0).then_some(self.max)
+        (self.count() > 0).then_some(Duration::from_nanos(self.max))
     }
 
     /// Answers a bucket, shortest first, with the bucket's upper bound.
@@ -184,25 +183,24 @@ impl Latency {
     }
 
     fn add(&mut self, other: &Self) {
-        self.min = match (self.count, other.count) {
+        self.min = match (self.count(), other.count()) {
             (0, _) => other.min,
             (_, 0) => self.min,
             _ => self.min.min(other.min),
         };
         self.max = self.max.max(other.max);
-        self.total += other.total;
-        self.count += other.count;
+        self.total = self.total.saturating_add(other.total);
         self.buckets.iter_mut().zip(other.buckets).for_each(|(bucket, count)| *bucket += count);
     }
 
     pub(crate) fn record(&mut self, latency: Duration) {
-        self.min = match self.count {
-            0 => latency,
-            _ => self.min.min(latency),
+        let nanos = u64::try_from(latency.as_nanos()).unwrap_or(u64::MAX);
+        self.min = match self.count() {
+            0 => nanos,
+            _ => self.min.min(nanos),
         };
-        self.max = self.max.max(latency);
-        self.total += latency;
-        self.count += 1;
+        self.max = self.max.max(nanos);
+        self.total = self.total.saturating_add(nanos);
         let bucket = Self::BOUNDS.partition_point(|bound| *bound < latency);
         self.buckets[bucket] += 1;
     }

@@ -317,9 +317,14 @@ impl Wire {
         }
     }
 
-    /// The phase, if it has changed since this was last asked.
-    pub(crate) fn news(&mut self) -> Option<&Phase> {
-        std::mem::take(&mut self.news).then_some(&self.phase)
+    /// Whether the phase has changed since this was last asked.
+    pub(crate) fn news(&mut self) -> bool {
+        std::mem::take(&mut self.news)
+    }
+
+    /// The state of the connection.
+    pub(crate) fn phase(&self) -> &Phase {
+        &self.phase
     }
 
     fn accepts(&mut self, now: Duration, unit: u8, priority: Priority) -> Result<(), LinkError> {
