@@ -185,7 +185,7 @@ impl Guarded {
         // Later than what was read: silence is counted from then.
         let now = clock();
         // What has ended meanwhile must not leave any more: its caller knows that it has not.
-        if self.port.is_blocked() {
+        if self.port.is_blocked() && self.wire.is_busy() {
             match self.port.poll_rest(cx) {
                 Poll::Ready(Ok(())) => self.wire.sent_rest(),
                 Poll::Ready(Err(cause)) => self.lost(now, cause, wakes),
