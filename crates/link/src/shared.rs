@@ -386,7 +386,8 @@ impl Guarded {
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use std::os::fd::AsFd;
     use std::sync::Arc;

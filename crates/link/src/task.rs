@@ -26,8 +26,6 @@ pub(crate) struct Task {
     connect_timeout: Duration,
     attempt: Option<Attempt>,
     alarm: Alarm,
-    /// Callers to wake once the lock is free.
-    wakes: Vec<Waker>,
     tracer: Option<Box<Tracer>>,
     told: Told,
 }
@@ -63,7 +61,6 @@ impl Task {
             endpoint,
             connect_timeout: options.connect_timeout,
             attempt: None,
-            wakes: Vec::new(),
             tracer: options.trace.map(|trace| Box::new(Tracer::new(trace, line.framing))),
             told: Told::default(),
         }
@@ -100,8 +97,10 @@ impl Future for Task {
         let task = &mut *self;
         loop {
             let connected = task.poll_attempt(cx);
+            // Callers to wake once the lock is free.
+            let mut wakes = Vec::new();
             let mut guarded = task.shared.lock();
-            let step = guarded.turn(cx, || task.shared.now(), connected, &mut task.wakes);
+            let step = guarded.turn(cx, || task.shared.now(), connected, &mut wakes);
             let now = task.shared.now();
             let news = guarded.news();
             let seen = guarded.seen();
@@ -109,9 +108,7 @@ impl Future for Task {
             guarded.sleeps(cx.waker(), task.alarm.next(now, step.until()));
             drop(guarded);
 
-            while let Some(caller) = task.wakes.pop() {
-                caller.wake();
-            }
+            wakes.into_iter().for_each(Waker::wake);
             if let Some(state) = news {
                 task.publish(state);
             }
