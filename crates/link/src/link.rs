@@ -183,7 +183,7 @@ impl Link {
 
     /// The state of the connection, and its changes.
     pub fn state(&self) -> watch::Receiver<WireState> {
-        self.owner.shared.state.subscribe()
+        self.owner.shared.subscribe()
     }
 
     /// Where the wire ends.

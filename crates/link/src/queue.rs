@@ -1,5 +1,6 @@
 //! What waits for a wire, in which order, and who is to be woken when it is done.
 
+use std::ops::{Index, IndexMut};
 use std::task::{Poll, Waker};
 use std::time::Duration;
 
@@ -17,7 +18,7 @@ const PROBE_REST: u32 = 3;
 ///
 /// Not `Clone`: it ends with the outcome, or with `cancel`.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) struct Ticket(usize);
+pub(crate) struct Ticket(u32);
 
 impl Ticket {
     pub(crate) fn place(&self) -> Place {
@@ -27,7 +28,7 @@ impl Ticket {
 
 /// A job's place in the queue, for the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place(usize);
+pub(crate) struct Place(u32);
 
 /// When a job may leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,7 +55,7 @@ pub(crate) enum Pick {
 /// Slots are used again and the lists run through them, so a wire in its stride allocates nothing and touches little.
 #[derive(Debug)]
 pub(crate) struct Queue {
-    slots: Vec<Slot>,
+    slots: Slots,
     waiting: [List; Priority::COUNT + 1],
     free: List,
     /// When the turn of a probe came last.
@@ -65,7 +66,13 @@ pub(crate) struct Queue {
 
 impl Queue {
     pub(crate) fn new(capacity: usize) -> Self {
-        Self { slots: Vec::new(), waiting: Default::default(), free: List::default(), probed: None, capacity }
+        Self {
+            slots: Slots::default(),
+            waiting: Default::default(),
+            free: List::default(),
+            probed: None,
+            capacity,
+        }
     }
 
     /// Whether one more job of this priority may wait.
@@ -74,7 +81,7 @@ impl Queue {
             Priority::Poll => self.waiting[PROBES].length,
             _ => 0,
         };
-        let waiting = self.waiting[priority.index()].length + probes;
+        let waiting = (self.waiting[priority.index()].length + probes) as usize;
         match waiting < self.capacity {
             true => Ok(()),
             false => Err(LinkError::QueueFull { waiting }),
@@ -91,14 +98,7 @@ impl Queue {
                 slot.entry = entry;
                 index
             }
-            None => {
-                if self.slots.is_empty() {
-                    // Most wires never have more than one job at a time.
-                    self.slots.reserve_exact(1);
-                }
-                self.slots.push(Slot { next: None, stage: Stage::Pending, entry, result: Ok(()) });
-                self.slots.len() - 1
-            }
+            None => self.slots.add(Slot { next: None, stage: Stage::Pending, entry, result: Ok(()) }),
         };
         self.waiting[class].push_back(&mut self.slots, index);
         Ticket(index)
@@ -130,7 +130,7 @@ impl Queue {
         let Self { slots, waiting, .. } = self;
         let list = &mut waiting[class];
         let mut wait: Option<Duration> = None;
-        let mut best: Option<(u64, Option<usize>, usize)> = None;
+        let mut best: Option<(u64, Option<u32>, u32)> = None;
         let mut before = None;
         for index in list.indexes(slots) {
             match turn(&slots[index].entry) {
@@ -254,7 +254,7 @@ impl Queue {
         }
     }
 
-    fn release(&mut self, index: usize) {
+    fn release(&mut self, index: u32) {
         self.slots[index].stage = Stage::Free;
         self.free.push_front(&mut self.slots, index);
     }
@@ -286,7 +286,7 @@ impl Entry {
 #[derive(Debug)]
 struct Slot {
     /// Behind this one in whichever list it is.
-    next: Option<usize>,
+    next: Option<u32>,
     stage: Stage,
     entry: Entry,
     result: Result<(), LinkError>,
@@ -302,16 +302,50 @@ enum Stage {
     Done,
 }
 
+/// The slots, by small numbers: each of thousands of wires has some lists of them.
+#[derive(Debug, Default)]
+struct Slots(Vec<Slot>);
+
+impl Slots {
+    /// One more slot; a queue never has more than a caller can count.
+    fn add(&mut self, slot: Slot) -> u32 {
+        if self.0.is_empty() {
+            // Most wires never have more than one job at a time.
+            self.0.reserve_exact(1);
+        }
+        self.0.push(slot);
+        u32::try_from(self.0.len() - 1).unwrap_or(u32::MAX)
+    }
+
+    fn get_mut(&mut self, index: u32) -> Option<&mut Slot> {
+        self.0.get_mut(index as usize)
+    }
+}
+
+impl Index<u32> for Slots {
+    type Output = Slot;
+
+    fn index(&self, index: u32) -> &Slot {
+        &self.0[index as usize]
+    }
+}
+
+impl IndexMut<u32> for Slots {
+    fn index_mut(&mut self, index: u32) -> &mut Slot {
+        &mut self.0[index as usize]
+    }
+}
+
 /// A list of slots, linked through them.
 #[derive(Debug, Default)]
 struct List {
-    first: Option<usize>,
-    last: usize,
-    length: usize,
+    first: Option<u32>,
+    last: u32,
+    length: u32,
 }
 
 impl List {
-    fn push_back(&mut self, slots: &mut [Slot], index: usize) {
+    fn push_back(&mut self, slots: &mut Slots, index: u32) {
         slots[index].next = None;
         match self.first {
             Some(_) => slots[self.last].next = Some(index),
@@ -321,7 +355,7 @@ impl List {
         self.length += 1;
     }
 
-    fn push_front(&mut self, slots: &mut [Slot], index: usize) {
+    fn push_front(&mut self, slots: &mut Slots, index: u32) {
         slots[index].next = self.first;
         if self.first.is_none() {
             self.last = index;
@@ -330,7 +364,7 @@ impl List {
         self.length += 1;
     }
 
-    fn pop_front(&mut self, slots: &[Slot]) -> Option<usize> {
+    fn pop_front(&mut self, slots: &Slots) -> Option<u32> {
         let index = self.first?;
         self.first = slots[index].next;
         self.length -= 1;
@@ -338,7 +372,7 @@ impl List {
     }
 
     /// Says whether it was there.
-    fn remove(&mut self, slots: &mut [Slot], index: usize) -> bool {
+    fn remove(&mut self, slots: &mut Slots, index: u32) -> bool {
         let mut whole = std::mem::take(self);
         let mut found = false;
         while let Some(other) = whole.pop_front(slots) {
@@ -351,7 +385,7 @@ impl List {
     }
 
     /// Takes one out that stands behind `before`.
-    fn unlink(&mut self, slots: &mut [Slot], before: Option<usize>, index: usize) {
+    fn unlink(&mut self, slots: &mut Slots, before: Option<u32>, index: u32) {
         let next = slots[index].next;
         match before {
             Some(before) => slots[before].next = next,
@@ -363,7 +397,7 @@ impl List {
         self.length -= 1;
     }
 
-    fn indexes<'a>(&self, slots: &'a [Slot]) -> impl Iterator<Item = usize> + use<'a> {
+    fn indexes<'a>(&self, slots: &'a Slots) -> impl Iterator<Item = u32> + use<'a> {
         std::iter::successors(self.first, |index| slots[*index].next)
     }
 }
@@ -423,7 +457,7 @@ mod tests {
         // Both slots are used again.
         queue.push(entry(Priority::Command, 8));
         queue.push(entry(Priority::Poll, 9));
-        assert_eq!(queue.slots.len(), 7);
+        assert_eq!(queue.slots.0.len(), 7);
         assert_eq!(queue.waiting().map(address).collect::<Vec<_>>(), [8, 1, 2, 3, 4, 6, 9]);
 
         let mut wakes = Vec::new();

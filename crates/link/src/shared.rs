@@ -1,9 +1,9 @@
 //! What the handles on a wire and its task share: the rules and the connection, behind one lock.
 
 use std::mem::MaybeUninit;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::task::{Context, Poll, Waker, ready};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use tokio::io::ReadBuf;
 use tokio::sync::watch;
@@ -18,7 +18,7 @@ use crate::port::Port;
 use crate::queue::{Place, Ticket};
 use crate::stream::Stream;
 use crate::trace::Seen;
-use crate::wire::{Step, Wire};
+use crate::wire::{Phase, Step, Wire};
 
 /// More than any frame: a read that does not fill it has emptied the socket, and the runtime knows so without asking
 /// the system again.
@@ -29,7 +29,8 @@ const READS: usize = 16;
 
 #[derive(Debug)]
 pub(crate) struct Shared {
-    pub(crate) state: watch::Sender<WireState>,
+    /// Made when somebody first asks: it is large, and most wires of a large fleet are watched by nobody.
+    state: OnceLock<watch::Sender<WireState>>,
     opened: Instant,
     guarded: Mutex<Guarded>,
 }
@@ -37,7 +38,7 @@ pub(crate) struct Shared {
 impl Shared {
     pub(crate) fn new(wire: Wire, line: Line, traced: bool) -> Self {
         Self {
-            state: watch::Sender::new(WireState::Connecting),
+            state: OnceLock::new(),
             opened: Instant::now(),
             guarded: Mutex::new(Guarded {
                 wire,
@@ -47,7 +48,25 @@ impl Shared {
                 task: None,
                 alarm: None,
                 seen: traced.then(Vec::new),
+                down_since: None,
             }),
+        }
+    }
+
+    /// The state of the connection from now on.
+    pub(crate) fn subscribe(&self) -> watch::Receiver<WireState> {
+        let mut guarded = self.lock();
+        self.state.get_or_init(|| watch::Sender::new(guarded.state())).subscribe()
+    }
+
+    /// Tells those who watch of a new state.
+    pub(crate) fn publish(&self, state: WireState) {
+        if let Some(sender) = self.state.get() {
+            sender.send_if_modified(|current| {
+                let changed = *current != state;
+                *current = state;
+                changed
+            });
         }
     }
 
@@ -140,6 +159,8 @@ pub(crate) struct Guarded {
     alarm: Option<Duration>,
     /// What went over the wire and has not been shown yet, if somebody wants to see it.
     seen: Option<Vec<Seen>>,
+    /// Since when the wire has been down, if it is.
+    down_since: Option<SystemTime>,
 }
 
 impl Guarded {
@@ -184,6 +205,24 @@ impl Guarded {
             Step::Connect | Step::Wait(_) | Step::End => {}
         }
         step
+    }
+
+    /// The state of the connection, if it has changed since this was last asked.
+    pub(crate) fn news(&mut self) -> Option<WireState> {
+        self.wire.news().then(|| self.state())
+    }
+
+    fn state(&mut self) -> WireState {
+        let state = match self.wire.phase() {
+            Phase::Connecting { .. } => WireState::Connecting,
+            Phase::Connected => WireState::Connected,
+            Phase::Down { reason, .. } => {
+                let since = *self.down_since.get_or_insert_with(SystemTime::now);
+                return WireState::Down { reason: reason.clone(), since };
+            }
+        };
+        self.down_since = None;
+        state
     }
 
     /// The task sleeps until it is woken, or until `alarm`.
@@ -347,10 +386,13 @@ impl Guarded {
     }
 }
 
+#[cfg(unix)]
 #[cfg(test)]
 mod tests {
+    use std::os::fd::AsFd;
     use std::sync::Arc;
 
+    use rustix::event::{PollFd, PollFlags, poll};
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
     use tokio::net::{TcpListener, TcpStream};
     use tokio::time::timeout;
@@ -378,6 +420,7 @@ mod tests {
     #[tokio::test]
     async fn a_write_that_was_called_not_sent_does_not_leave_after_all() {
         let (stream, mut peer, stuffed) = stuffed().await;
+        let same = stream.as_fd().try_clone_to_owned().unwrap();
         let endpoint: Arc<Endpoint> = Arc::new("tcp://192.0.2.1".parse().unwrap());
         let wire = Wire::new(endpoint, Line::tcp(), &Options::default());
         let shared = Shared::new(wire, Line::tcp(), false);
@@ -400,6 +443,8 @@ mod tests {
 
         // The peer breaks the protocol, and takes bytes again.
         peer.write_all(&[0, 1, 0, 0, 0xFF, 0xFF, 1]).await.unwrap();
+        poll(&mut [PollFd::new(&same, PollFlags::IN)], None).unwrap();
+        drop(same);
         let mut taken = vec![0; stuffed];
         peer.read_exact(&mut taken).await.unwrap();
         while turn(None) != Step::Disconnect {

@@ -4,7 +4,7 @@ use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, Waker, ready};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use tracing::{debug, info, warn};
 
@@ -17,7 +17,7 @@ use crate::options::Options;
 use crate::shared::Shared;
 use crate::stream::Stream;
 use crate::trace::Tracer;
-use crate::wire::{Phase, Step};
+use crate::wire::Step;
 
 /// The future behind one wire; it ends when the wire is closed.
 pub(crate) struct Task {
@@ -26,8 +26,6 @@ pub(crate) struct Task {
     connect_timeout: Duration,
     attempt: Option<Attempt>,
     alarm: Alarm,
-    /// Callers to wake once the lock is free.
-    wakes: Vec<Waker>,
     tracer: Option<Box<Tracer>>,
     told: Told,
 }
@@ -63,7 +61,6 @@ impl Task {
             endpoint,
             connect_timeout: options.connect_timeout,
             attempt: None,
-            wakes: Vec::new(),
             tracer: options.trace.map(|trace| Box::new(Tracer::new(trace, line.framing))),
             told: Told::default(),
         }
@@ -89,17 +86,7 @@ impl Task {
             (WireState::Down { reason, .. }, true) => warn!("{reason}"),
             (WireState::Down { reason, .. }, false) => debug!("{reason}"),
         }
-        self.shared.state.send_if_modified(|current| {
-            let mut state = state;
-            if let (WireState::Down { since, .. }, WireState::Down { since: first, .. }) =
-                (&mut state, &*current)
-            {
-                *since = *first;
-            }
-            let changed = *current != state;
-            *current = state;
-            changed
-        });
+        self.shared.publish(state);
     }
 }
 
@@ -110,18 +97,18 @@ impl Future for Task {
         let task = &mut *self;
         loop {
             let connected = task.poll_attempt(cx);
+            // Callers to wake once the lock is free.
+            let mut wakes = Vec::new();
             let mut guarded = task.shared.lock();
-            let step = guarded.turn(cx, || task.shared.now(), connected, &mut task.wakes);
+            let step = guarded.turn(cx, || task.shared.now(), connected, &mut wakes);
             let now = task.shared.now();
-            let news = guarded.wire.news().map(state_of);
+            let news = guarded.news();
             let seen = guarded.seen();
             let busy = guarded.wire.is_busy();
             guarded.sleeps(cx.waker(), task.alarm.next(now, step.until()));
             drop(guarded);
 
-            while let Some(caller) = task.wakes.pop() {
-                caller.wake();
-            }
+            wakes.into_iter().for_each(Waker::wake);
             if let Some(state) = news {
                 task.publish(state);
             }
@@ -151,14 +138,6 @@ impl Drop for Task {
     }
 }
 
-fn state_of(phase: &Phase) -> WireState {
-    match phase {
-        Phase::Connecting { .. } => WireState::Connecting,
-        Phase::Connected => WireState::Connected,
-        Phase::Down { reason, .. } => WireState::Down { reason: reason.clone(), since: SystemTime::now() },
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,7 +148,7 @@ mod tests {
         let down = || {
             let endpoint: Arc<Endpoint> = Arc::new("tcp://10.0.0.7".parse().unwrap());
             let reason = Outage { endpoint, cause: Cause::Refused };
-            WireState::Down { reason, since: SystemTime::UNIX_EPOCH }
+            WireState::Down { reason, since: std::time::SystemTime::UNIX_EPOCH }
         };
         let mut told = Told::default();
         let states = [

@@ -5,12 +5,12 @@
 
 mod connection;
 mod exchange;
+mod quiet;
 
 use std::sync::Arc;
 use std::task::{Poll, Waker};
 use std::time::Duration;
 
-use busbar_modbus::client::DEFAULT_QUIET;
 use busbar_modbus::{Client, Progress};
 
 use crate::doubt::Doubts;
@@ -29,9 +29,6 @@ pub(crate) use connection::Phase;
 
 /// Longer waits are cut to this, so that no sum of times overflows.
 const LONGEST_WAIT: Duration = Duration::from_secs(24 * 60 * 60);
-
-/// Who waits for a silent line waits so long at least: what is late may take as long.
-const LEAST_PATIENCE: Duration = DEFAULT_QUIET.saturating_mul(2);
 
 /// A poll of a unit that never answered goes ahead of another once it has waited so many of its time-outs, and one of a
 /// silent unit after so many.
@@ -317,9 +314,14 @@ impl Wire {
         }
     }
 
-    /// The phase, if it has changed since this was last asked.
-    pub(crate) fn news(&mut self) -> Option<&Phase> {
-        std::mem::take(&mut self.news).then_some(&self.phase)
+    /// Whether the phase has changed since this was last asked.
+    pub(crate) fn news(&mut self) -> bool {
+        std::mem::take(&mut self.news)
+    }
+
+    /// The state of the connection.
+    pub(crate) fn phase(&self) -> &Phase {
+        &self.phase
     }
 
     fn accepts(&mut self, now: Duration, unit: u8, priority: Priority) -> Result<(), LinkError> {
@@ -386,45 +388,6 @@ impl Wire {
                 Err(error) => self.queue.finish(place, Err(error), wakes),
             }
         }
-    }
-
-    /// When the next request may leave if the line stays silent.
-    fn ready(&self) -> Duration {
-        self.client.quiet_until().map_or(self.earliest, |until| until.max(self.earliest))
-    }
-
-    /// RTU: something is on the line, which has to be silent after it.
-    fn break_silence(&mut self, now: Duration) {
-        let silent = now + self.line.silence;
-        if self.exchange.is_none() && silent > self.earliest {
-            match now < self.ready() {
-                true => self.disturbed.get_or_insert(now),
-                false => self.disturbed.insert(now),
-            };
-        }
-        self.earliest = self.earliest.max(silent);
-    }
-
-    /// On a line that never falls silent nobody waits for longer than for an answer. Says when the next one will have.
-    fn wait_for_silence(&mut self, now: Duration, wakes: &mut Vec<Waker>) -> Option<Duration> {
-        let Some(since) = self.disturbed else {
-            let somebody_waits = self.together.is_some() || !self.queue.is_empty();
-            return somebody_waits.then_some(Duration::MAX);
-        };
-        let until = |entry: &Entry| entry.since.max(since) + entry.job.timeout.max(LEAST_PATIENCE);
-        let judge = |entry: &Entry| {
-            let Job { unit, timeout: after, .. } = entry.job;
-            (until(entry) <= now).then_some(LinkError::NeverSilent { unit, after })
-        };
-        self.queue.fail_waiting(judge, wakes);
-        if let Some(place) = self.together
-            && let Some(error) = self.queue.entry(place).and_then(|entry| judge(entry))
-        {
-            self.together = None;
-            self.queue.finish(place, Err(error), wakes);
-        }
-        let together = self.together.map(|place| self.queue.entry(place).map_or(now, |entry| until(entry)));
-        self.queue.waiting().map(until).chain(together).min()
     }
 
     /// Until when a poll lets those of others go first, if nobody knows whether its unit will answer.

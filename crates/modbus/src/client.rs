@@ -80,8 +80,8 @@ pub struct Client {
     next_transaction: u16,
     /// TCP: the beginning of a frame whose rest has not come.
     unfinished: Vec<u8>,
-    /// RTU: bytes that are not a frame yet.
-    cutter: RtuCutter,
+    /// RTU: bytes that are not a frame yet. Boxed: there may be thousands of clients, nearly all of them over TCP.
+    cutter: Option<Box<RtuCutter>>,
     /// The PDU that answered last.
     answer: Vec<u8>,
     quiet: Duration,
@@ -119,7 +119,7 @@ impl Client {
             state: State::Idle,
             next_transaction: 1,
             unfinished: Vec::new(),
-            cutter: RtuCutter::default(),
+            cutter: (framing == Framing::Rtu).then(Box::default),
             answer: Vec::new(),
             quiet: DEFAULT_QUIET,
             quiet_until: None,
@@ -221,7 +221,9 @@ impl Client {
                 if self.quiet_until.is_some() && !bytes.is_empty() {
                     self.quiet_until = Some(now.saturating_add(self.quiet));
                 }
-                self.cutter.push(bytes);
+                if let Some(cutter) = &mut self.cutter {
+                    cutter.push(bytes);
+                }
                 self.cut_rtu()
             }
         };
@@ -238,8 +240,8 @@ impl Client {
     /// RTU: nothing came for at least 3.5 characters. Ends the answer to a function whose length only silence tells,
     /// and gives up on half frames. Over TCP silence means nothing.
     pub fn silence(&mut self, now: Duration) -> Progress {
-        if self.framing == Framing::Rtu {
-            self.cutter.silence();
+        if let Some(cutter) = &mut self.cutter {
+            cutter.silence();
             if self.cut_rtu() {
                 return Progress::Answered;
             }
@@ -310,7 +312,9 @@ impl Client {
     pub fn reset(&mut self) {
         self.state = State::Idle;
         self.unfinished.clear();
-        self.cutter.reset();
+        if let Some(cutter) = &mut self.cutter {
+            cutter.reset();
+        }
         self.quiet_until = None;
         self.fault = None;
     }

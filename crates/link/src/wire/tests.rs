@@ -547,13 +547,13 @@ fn takes_a_short_answer_only_for_who_allows_it() {
 #[test]
 fn reports_each_change_of_the_connection_once() {
     let mut script = Script::new();
-    assert_eq!(script.wire.news(), None);
+    assert!(!script.wire.news());
     script.connect(0);
-    assert_eq!(script.wire.news(), Some(&Phase::Connected));
-    assert_eq!(script.wire.news(), None);
+    assert!(script.wire.news() && *script.wire.phase() == Phase::Connected);
+    assert!(!script.wire.news());
     script.loses(1, Cause::Closed);
-    assert!(matches!(script.wire.news(), Some(Phase::Connecting { .. })));
+    assert!(script.wire.news() && matches!(script.wire.phase(), Phase::Connecting { .. }));
     script.step(201);
     script.refuses(202, Cause::Refused);
-    assert!(matches!(script.wire.news(), Some(Phase::Down { .. })));
+    assert!(script.wire.news() && matches!(script.wire.phase(), Phase::Down { .. }));
 }

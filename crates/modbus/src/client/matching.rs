@@ -4,7 +4,7 @@ use super::{Client, Counters, MAX_STRAYS, State, Stray};
 use crate::error::{Fault, Mismatch};
 use crate::mbap::{self, Front};
 use crate::pdu::{EXCEPTION_BIT, Response};
-use crate::stream::guess_response;
+use crate::stream::{RtuCutter, guess_response};
 
 /// What one frame is to a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,30 +128,33 @@ impl Client {
 
     /// Judges all whole frames in the RTU buffer; says whether one was the answer.
     pub(super) fn cut_rtu(&mut self) -> bool {
+        let Self { cutter: Some(cutter), state, answer, counters, strays, .. } = self else {
+            return false;
+        };
         let mut answered = false;
-        loop {
-            let Some(frame) = self.cutter.next(|bytes, _| guess_response(bytes)) else {
-                self.count_losses();
-                return answered;
-            };
-            let frame = self.cutter.frame(&frame);
-            let verdict = Verdict::of(&self.state, None, frame.unit, frame.pdu);
-            answered |= settle(verdict, frame.pdu, &mut self.state, &mut self.answer);
-            verdict.note(frame.unit, frame.pdu, &mut self.counters, &mut self.strays);
+        while let Some(frame) = cutter.next(|bytes, _| guess_response(bytes)) {
+            let frame = cutter.frame(&frame);
+            let verdict = Verdict::of(state, None, frame.unit, frame.pdu);
+            answered |= settle(verdict, frame.pdu, state, answer);
+            verdict.note(frame.unit, frame.pdu, counters, strays);
         }
+        count_losses(cutter, counters);
+        answered
     }
 
     /// Drops the bytes on an RTU line that are no frame yet.
     pub(super) fn discard_rtu(&mut self) {
-        self.cutter.discard();
-        self.count_losses();
+        if let Some(cutter) = &mut self.cutter {
+            cutter.discard();
+            count_losses(cutter, &mut self.counters);
+        }
     }
+}
 
-    fn count_losses(&mut self) {
-        let losses = self.cutter.losses();
-        self.counters.crc_errors = losses.crc_errors;
-        self.counters.garbage_bytes = losses.garbage_bytes;
-    }
+fn count_losses(cutter: &RtuCutter, counters: &mut Counters) {
+    let losses = cutter.losses();
+    counters.crc_errors = losses.crc_errors;
+    counters.garbage_bytes = losses.garbage_bytes;
 }
 
 /// Keeps the answer; says whether it was one.
