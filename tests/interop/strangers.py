@@ -101,7 +101,7 @@ class Libmodbus:
     def __init__(self, wire, unit, timeout=LONG):
         self.lib = self._load()
         if wire.device:
-            self.context = self.lib.modbus_new_rtu(wire.device.encode(), 9600, b"N", 8, 1)
+            self.context = self.lib.modbus_new_rtu(wire.device.encode(), 9600, ord("N"), 8, 1)
         else:
             self.context = self.lib.modbus_new_tcp(wire.host.encode(), wire.port)
         assert self.context

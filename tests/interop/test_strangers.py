@@ -18,7 +18,7 @@ class Controller:
     key: str
     # Some block that is readable as a whole, as long as the device answers at most.
     block: tuple
-    # Registers that stand still.
+    # Registers that stand still, all 16 bits of them.
     still: list
     # Addresses that the manual does not print.
     holes: list
@@ -40,7 +40,7 @@ CONTROLLERS = [
         write=(8193, 8, 10605, 0xFFFF, 8), protected=10605, functions=[3, 6, 16],
     ),
     Controller(
-        "datakom-dkg705", block=(0x0000, 16), still=[0x1000], holes=[0x0038, 0x0044, 0x1003, 0x1029],
+        "datakom-dkg705", block=(0x0000, 16), still=[0x1001, 0x102D], holes=[0x0038, 0x0044, 0x1003, 0x1029],
         write=(0x0040, 0x40, 0x003D, 0x40, 0x40), protected=0x003F, functions=[3, 6],
     ),
     Controller(

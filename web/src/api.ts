@@ -528,8 +528,13 @@ export interface components {
         /** @description The mode a device is in. */
         ModeView: {
             /**
+             * @description The shared word of the vocabulary: `off`, `manual`, `auto` and so on; null where there is none.
+             * @example auto
+             */
+            canonical: string | null;
+            /**
              * Format: int32
-             * @description The code in the register, or the number of the bit where each mode has a bit of its own.
+             * @description The code in the register, or the number of the bit that tells the mode.
              * @example 4
              */
             code: number;

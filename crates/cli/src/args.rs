@@ -99,9 +99,9 @@ pub(crate) struct Emulate {
     /// How many times faster than real time the plant runs
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = speed)]
     pub(crate) speed: f64,
-    /// Seed of everything that is left to chance
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) seed: u64,
+    /// Seed of everything that is left to chance; a calendar then starts at a fixed time instead of now [default: 1]
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
     /// Hold a point at a value; may be repeated
     #[arg(long, value_name = "POINT=VALUE", value_parser = pin)]
     pub(crate) set: Vec<(String, String)>,

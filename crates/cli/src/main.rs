@@ -15,6 +15,7 @@ mod runtime;
 mod table;
 mod terminal;
 mod usage;
+mod wall_clock;
 mod wire;
 
 use std::process::ExitCode;

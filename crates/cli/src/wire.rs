@@ -154,7 +154,7 @@ pub(crate) fn sentence(error: &LinkError, profile: Option<&Profile>) -> String {
 /// Whether setting up the controller or its wiring may be what is wrong.
 fn is_no_answer(error: &LinkError) -> bool {
     match error {
-        LinkError::Timeout { .. } => true,
+        LinkError::Timeout { .. } | LinkError::NeverSilent { .. } => true,
         LinkError::Down { reason } => matches!(
             reason.cause,
             Cause::Refused

@@ -3,6 +3,10 @@
 use std::time::Duration;
 
 use busbar_link::Endpoint;
+use busbar_profile::DateTime;
+
+/// 5 January 2026 at ten, after the first instant of 2000.
+const MONDAY_MORNING: Duration = Duration::from_secs(9501 * 86_400 + 10 * 3600);
 
 /// How one imitated controller is to be started.
 #[derive(Clone, Debug)]
@@ -24,6 +28,9 @@ pub struct Config {
     pub pins: Vec<(String, String)>,
     /// Something happens at the site by itself: the demonstration wants it.
     pub story: bool,
+    /// What the calendar of a controller that has one says at power-on. Nothing else depends on it: the weather, the
+    /// story and every other register follow the seed and the time that has passed.
+    pub epoch: DateTime,
     /// Connections served at the same time; further ones are closed at once.
     pub connections: usize,
     /// A connection without a byte for this long is closed, at the latest after twice as long.
@@ -41,8 +48,19 @@ impl Default for Config {
             speed: 1.0,
             pins: Vec::new(),
             story: false,
+            epoch: DateTime::FIRST.plus(MONDAY_MORNING),
             connections: 128,
             idle: Duration::from_secs(300),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn calendars_start_on_a_monday_morning_unless_told_otherwise() {
+        assert_eq!(Config::default().epoch.to_string(), "2026-01-05T10:00:00");
     }
 }

@@ -77,17 +77,20 @@ impl Device {
         }
     }
 
-    /// Answers one request, or stays silent: to another unit, to unit 0, and while it restarts.
+    /// Whether a request has a function that the device knows and a body that does not fit it: the manuals have no
+    /// exception for that.
+    pub(crate) fn is_malformed(&self, request: &Request<'_>) -> bool {
+        matches!(request, Request::Other { function, .. }
+            if self.bank.profile().wire.functions.contains(function))
+    }
+
+    /// Answers one request, or stays silent: to another unit, to unit 0, to what is malformed, and while it restarts.
     pub fn answer(&mut self, unit: u8, request: &Request<'_>) -> Option<Response<'_>> {
-        if unit != self.unit || self.panel.is_silent() {
+        if unit != self.unit || self.panel.is_silent() || self.is_malformed(request) {
             return None;
         }
         let wire = &self.bank.profile().wire;
         let function = request.function();
-        if matches!(request, Request::Other { .. }) && wire.functions.contains(&function) {
-            // A function it knows with a body that does not fit: the manual has no exception for that.
-            return None;
-        }
         let refuse = |code: ExceptionCode| Response::Exception { function, code };
         Some(match permit(request, wire, self.refusals, &self.bank) {
             Err(code) => refuse(code),
@@ -110,11 +113,6 @@ impl Device {
                 Response::WriteMultipleRegisters { address, count: registers.len() as u16 }
             }
         })
-    }
-
-    #[cfg(test)]
-    pub(crate) fn with_answer_delay(self, answer_delay: Duration) -> Self {
-        Self { answer_delay, ..self }
     }
 
     /// The unit id that it answers to.
@@ -173,7 +171,7 @@ fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartErro
         "datakom-dkg705" => {
             // There is one.
             chosen(&profile.models, config, "DKG-705")?;
-            Ok(Box::new(DatakomDkg705::new(config.seed, config.story)))
+            Ok(Box::new(DatakomDkg705::new(config.seed, config.story).starting(config.epoch)))
         }
         "smartgen-acc1700" => {
             let model = Model::of(chosen(&profile.models, config, "ACC1700CAN")?);
@@ -181,7 +179,7 @@ fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartErro
         }
         "smartgen-hat821si" => {
             chosen(&profile.models, config, "HAT821SI")?;
-            Ok(Box::new(Hat821si::new(config.seed, config.story)))
+            Ok(Box::new(Hat821si::new(config.seed, config.story).starting(config.epoch)))
         }
         _ => Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() }),
     }

@@ -443,12 +443,20 @@ impl Device {
         let point = &self.site.profile.points[index];
         let value = self.good(index)?;
         if let Some(code) = value.as_code() {
-            return Some(ModeView { code, label: point.label(code, self.model).into_owned() });
+            let label = point.label(code, self.model).into_owned();
+            let canonical = point.choice(code).and_then(|choice| choice.state.clone());
+            return Some(ModeView { code, label, canonical });
         }
-        // A word of bits has one bit for each mode.
+        // A word of bits has one bit for each mode, or one bit for two.
         let set = value.as_bits()?;
-        let mode = point.bits.iter().find(|bit| bit.state.is_some() && set.contains(bit.bit))?;
-        Some(ModeView { code: u32::from(mode.bit), label: mode.label.clone() })
+        point.bits.iter().find_map(|bit| {
+            let (label, state) = match (set.contains(bit.bit), &bit.clear) {
+                (true, _) => (&bit.label, bit.state.as_ref()?),
+                (false, Some(clear)) => (&clear.label, &clear.state),
+                (false, None) => return None,
+            };
+            Some(ModeView { code: bit.bit.into(), label: label.clone(), canonical: Some(state.clone()) })
+        })
     }
 
     pub(crate) fn alarm_views(&self) -> Vec<AlarmView> {

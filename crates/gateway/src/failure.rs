@@ -57,10 +57,13 @@ impl Failure {
         }
     }
 
-    /// Whether the device was asked and said nothing, though nothing else is known to be wrong.
+    /// Whether the device said nothing, or could not even be asked for all that was said on its line, though nothing
+    /// else is known to be wrong.
     pub(crate) fn is_silence(&self) -> bool {
         match self {
-            Self::Link(LinkError::Timeout { .. } | LinkError::Silent { .. }) => true,
+            Self::Link(
+                LinkError::Timeout { .. } | LinkError::Silent { .. } | LinkError::NeverSilent { .. },
+            ) => true,
             Self::Link(LinkError::Down { reason }) => {
                 matches!(reason.cause, Cause::Silent { .. } | Cause::StillConnecting { .. })
             }
@@ -104,6 +107,8 @@ mod tests {
         assert!(!outage(Cause::Refused).is_no_news_after(&timeout()));
         let again = Duration::from_millis(700);
         let held = Failure::Link(LinkError::Silent { unit: 1, next_probe: again });
+        let noisy = Failure::Link(LinkError::NeverSilent { unit: 1, after: again });
+        assert!(noisy.is_no_news_after(&timeout()) && !noisy.device_answered() && noisy.may_pass());
         assert!(held.is_silence() && held.is_no_news_after(&timeout()) && !held.device_answered());
         assert_eq!((held.next_probe(), timeout().next_probe()), (Some(again), None));
         assert!(refusal(2).is_illegal_address() && !refusal(3).is_illegal_address());

@@ -7,6 +7,11 @@ use std::time::Duration;
 
 use tokio::time::{Instant, Sleep, sleep_until};
 
+use crate::timer::LineTimer;
+
+/// How long it may take the system to wake us, which on a serial line is waited out instead.
+const LEAD: Duration = Duration::from_micros(80);
+
 /// One timer for the life of the wire.
 ///
 /// Deadlines mostly move later and are mostly not reached. So an early alarm is left to ring and set anew then, which
@@ -23,7 +28,7 @@ pub(crate) struct Alarm {
 pub(crate) enum Precision {
     /// To the millisecond or two, from the runtime's timer wheel: there may be thousands.
     Coarse,
-    /// To some ten microseconds, where the system can: a silence of 3.65 ms must not become 5.
+    /// To some microseconds, where the system can: a silence of 3.65 ms must not become 5.
     Fine,
 }
 
@@ -65,108 +70,28 @@ impl Alarm {
 
 enum Timer {
     Wheel(Pin<Box<Sleep>>),
-    #[cfg(target_os = "linux")]
-    System(Box<system::Timer>),
+    Line(Box<LineTimer>),
 }
 
 impl Timer {
     fn new(precision: Precision, at: Instant) -> Self {
         match precision {
             Precision::Coarse => Self::Wheel(Box::pin(sleep_until(at))),
-            Precision::Fine => Self::fine(at),
+            Precision::Fine => Self::Line(Box::new(LineTimer::new().with_lead(LEAD))),
         }
-    }
-
-    /// A system that has no more such timers still has the wheel.
-    #[cfg(target_os = "linux")]
-    fn fine(at: Instant) -> Self {
-        match system::Timer::new() {
-            Ok(timer) => Self::System(Box::new(timer)),
-            Err(_) => Self::Wheel(Box::pin(sleep_until(at))),
-        }
-    }
-
-    #[cfg(not(target_os = "linux"))]
-    fn fine(at: Instant) -> Self {
-        Self::Wheel(Box::pin(sleep_until(at)))
     }
 
     fn set(&mut self, at: Instant) {
         match self {
             Self::Wheel(sleep) => sleep.as_mut().reset(at),
-            #[cfg(target_os = "linux")]
-            Self::System(timer) => {
-                if timer.set(at).is_err() {
-                    *self = Self::Wheel(Box::pin(sleep_until(at)));
-                }
-            }
+            Self::Line(timer) => timer.set(at.into_std()),
         }
     }
 
     fn poll(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         match self {
             Self::Wheel(sleep) => sleep.as_mut().poll(cx),
-            #[cfg(target_os = "linux")]
-            Self::System(timer) => timer.poll(cx),
-        }
-    }
-}
-
-/// The kernel's own timer as a file: it rings to some ten microseconds and wakes the runtime like a socket.
-#[cfg(target_os = "linux")]
-mod system {
-    use std::io;
-    use std::os::fd::OwnedFd;
-    use std::task::{Context, Poll, ready};
-
-    use rustix::time::{
-        Itimerspec, TimerfdClockId, TimerfdFlags, TimerfdTimerFlags, Timespec, timerfd_create,
-        timerfd_settime,
-    };
-    use tokio::io::Interest;
-    use tokio::io::unix::AsyncFd;
-    use tokio::time::Instant;
-
-    pub(super) struct Timer {
-        file: AsyncFd<OwnedFd>,
-        at: Option<Instant>,
-    }
-
-    impl Timer {
-        pub(super) fn new() -> io::Result<Self> {
-            let flags = TimerfdFlags::NONBLOCK | TimerfdFlags::CLOEXEC;
-            let file = timerfd_create(TimerfdClockId::Monotonic, flags)?;
-            #[expect(deprecated, reason = "its successor is unsafe; an OwnedFd stays the same file")]
-            let file = AsyncFd::with_interest(file, Interest::READABLE)?;
-            Ok(Self { file, at: None })
-        }
-
-        pub(super) fn set(&mut self, at: Instant) -> io::Result<()> {
-            // Zero would stop it.
-            let wait = at.saturating_duration_since(Instant::now()).max(std::time::Duration::from_nanos(1));
-            let once = Itimerspec {
-                it_interval: Timespec { tv_sec: 0, tv_nsec: 0 },
-                it_value: Timespec {
-                    tv_sec: wait.as_secs().try_into().unwrap_or(i64::MAX),
-                    tv_nsec: wait.subsec_nanos().into(),
-                },
-            };
-            timerfd_settime(self.file.get_ref(), TimerfdTimerFlags::empty(), &once)?;
-            self.at = Some(at);
-            Ok(())
-        }
-
-        /// The file only wakes; the clock says whether it is time, so a ring of an earlier setting does no harm.
-        pub(super) fn poll(&mut self, cx: &mut Context<'_>) -> Poll<()> {
-            while self.at.is_some_and(|at| Instant::now() < at) {
-                // The runtime is shutting down if this fails, and nobody waits any more.
-                let Ok(mut guard) = ready!(self.file.poll_read_ready(cx)) else {
-                    return Poll::Pending;
-                };
-                let mut rings = [0; 8];
-                let _ = guard.try_io(|file| Ok(rustix::io::read(file.get_ref(), &mut rings)?));
-            }
-            Poll::Ready(())
+            Self::Line(timer) => timer.poll(cx),
         }
     }
 }

@@ -49,6 +49,16 @@ pub enum LinkError {
         /// How long until the next poll goes through, in whole milliseconds.
         next_probe: Duration,
     },
+    /// A serial line was never silent for long enough to ask anything. A write that ends so was not sent.
+    #[error(
+        "nothing was sent to unit {unit}, for the line was not silent within {after:?}; check that no other client asks on this line, baud rate and parity, and the terminators"
+    )]
+    NeverSilent {
+        /// Unit id asked.
+        unit: u8,
+        /// How long a silence was waited for.
+        after: Duration,
+    },
     /// There is no connection. A write that ends so was not sent.
     #[error("{reason}")]
     Down {
@@ -107,7 +117,9 @@ impl LinkError {
     pub fn fault(&self) -> Fault {
         match self {
             Self::Exception { .. } => Fault::Device,
-            Self::Timeout { .. } | Self::Silent { .. } | Self::Lost { .. } => Fault::Wire,
+            Self::Timeout { .. } | Self::Silent { .. } | Self::NeverSilent { .. } | Self::Lost { .. } => {
+                Fault::Wire
+            }
             Self::Down { reason } => match reason.cause {
                 Cause::Garbage | Cause::Closed => Fault::Peer,
                 _ => Fault::Wire,
@@ -139,10 +151,12 @@ pub enum Fault {
 #[non_exhaustive]
 pub enum Loss {
     /// It did not come in time.
-    #[error("none within {after:?}")]
+    #[error("none within {after:?}: {heard}")]
     TimedOut {
         /// How long it was waited for.
         after: Duration,
+        /// What came instead.
+        heard: Heard,
     },
     /// The connection dropped first.
     #[error("{0}")]
@@ -299,6 +313,11 @@ mod tests {
                 "unit 7 did not answer within 1.5s, asked 2 times: check the unit id and that the device is on",
             ),
             (
+                LinkError::Silent { unit: 7, next_probe: Duration::from_millis(3500) },
+                Fault::Wire,
+                "unit 7 has not answered lately and is polled again in 3.5s: check the unit id and that the device is on",
+            ),
+            (
                 LinkError::Timeout {
                     unit: 7,
                     after: Duration::from_millis(300),
@@ -306,12 +325,12 @@ mod tests {
                     heard: Heard::Noise { bytes: 5 },
                 },
                 Fault::Wire,
-                "unit 7 did not answer within 300ms, asked once: 5 bytes came that make no frame; check baud rate and parity, the terminators, and that no two devices have one unit id (docs/connect/)",
+                "unit 7 did not answer within 300ms, asked once: 5 bytes came that make no frame; check baud rate and parity, the terminators, and that no two devices have one unit id",
             ),
             (
-                LinkError::Silent { unit: 7, next_probe: Duration::from_millis(3500) },
+                LinkError::NeverSilent { unit: 7, after: Duration::from_secs(1) },
                 Fault::Wire,
-                "unit 7 has not answered lately and is polled again in 3.5s: check the unit id and that the device is on",
+                "nothing was sent to unit 7, for the line was not silent within 1s; check that no other client asks on this line, baud rate and parity, and the terminators",
             ),
             (
                 LinkError::Down { reason: outage(Cause::Refused) },
@@ -324,9 +343,12 @@ mod tests {
                 "tcp://10.0.0.7:502: the peer sent bytes that are no Modbus TCP: check that the port is the right one",
             ),
             (
-                LinkError::Lost { unit: 1, loss: Loss::TimedOut { after: Duration::from_secs(1) } },
+                LinkError::Lost {
+                    unit: 1,
+                    loss: Loss::TimedOut { after: Duration::from_secs(1), heard: Heard::BadCrc },
+                },
                 Fault::Wire,
-                "the answer to a write to unit 1 was lost (none within 1s); it may have taken effect: read the state before anything else",
+                "the answer to a write to unit 1 was lost (none within 1s: a frame came with a wrong check sum; check baud rate and parity, the terminators, and that no two devices have one unit id); it may have taken effect: read the state before anything else",
             ),
             (
                 LinkError::NotARead { function: 6 },
@@ -348,11 +370,14 @@ mod tests {
             assert_eq!(exception(6, code).may_have_taken_effect(), !nothing_done, "exception {code}");
             assert!(!exception(3, code).may_have_taken_effect(), "a read changes nothing");
         }
-        let lost = LinkError::Lost { unit: 1, loss: Loss::TimedOut { after: Duration::from_secs(1) } };
+        let heard = Heard::Nothing { serial: false };
+        let loss = Loss::TimedOut { after: Duration::from_secs(1), heard };
+        let lost = LinkError::Lost { unit: 1, loss };
         assert!(lost.may_have_taken_effect());
         for error in [
             LinkError::Down { reason: outage(Cause::Refused) },
             LinkError::QueueFull { waiting: 64 },
+            LinkError::NeverSilent { unit: 1, after: Duration::from_secs(1) },
             LinkError::NotSent(StartError::Busy),
             LinkError::Closed,
         ] {

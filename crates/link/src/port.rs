@@ -35,6 +35,11 @@ impl Port {
         self.sent
     }
 
+    /// How much of the frame the system has taken.
+    pub(crate) fn sent(&self) -> usize {
+        self.sent
+    }
+
     /// Whether some of the frame is still to be sent.
     pub(crate) fn is_blocked(&self) -> bool {
         self.sent < self.frame.len()

@@ -6,12 +6,12 @@ use std::time::Duration;
 use crate::error::LinkError;
 use crate::job::{Job, Outcome, Priority};
 
-/// The class behind those of `Priority`: polls of units that did not answer last time, or never were asked.
+/// The class behind those of `Priority`: polls of units that have not answered for several times, or never did. One that
+/// has waited long enough goes ahead of a poll, so that a busy wire finds out about them.
 const PROBES: usize = Priority::COUNT;
 
-/// A probe that has waited so many of its time-outs goes ahead of a poll, so that a busy wire finds out that a unit is
-/// back.
-const PROBE_PATIENCE: u32 = 10;
+/// But not before so many of its time-outs have passed since the last probe: those who answer keep most of the wire.
+const PROBE_REST: u32 = 3;
 
 /// A caller's claim on one outcome.
 ///
@@ -57,21 +57,15 @@ pub(crate) struct Queue {
     slots: Vec<Slot>,
     waiting: [List; Priority::COUNT + 1],
     free: List,
-    /// The last job whose turn came was a probe: now it is somebody else's.
-    probed: bool,
+    /// When the turn of a probe came last.
+    probed: Option<Duration>,
     /// Most jobs that may wait in one priority, so that polling cannot shut out a command.
     capacity: usize,
 }
 
 impl Queue {
     pub(crate) fn new(capacity: usize) -> Self {
-        Self {
-            slots: Vec::new(),
-            waiting: Default::default(),
-            free: List::default(),
-            probed: false,
-            capacity,
-        }
+        Self { slots: Vec::new(), waiting: Default::default(), free: List::default(), probed: None, capacity }
     }
 
     /// Whether one more job of this priority may wait.
@@ -120,7 +114,9 @@ impl Queue {
         for class in order {
             match self.pick_in(class, &mut turn) {
                 Pick::Job(place) => {
-                    self.probed = class == PROBES;
+                    if class == PROBES {
+                        self.probed = Some(now);
+                    }
                     return Pick::Job(place);
                 }
                 Pick::Wait(until) => wait = Some(wait.map_or(until, |wait| wait.min(until))),
@@ -164,12 +160,13 @@ impl Queue {
         }
     }
 
-    /// Whether a probe has waited long enough to go ahead of a poll, once.
+    /// Whether a probe has waited long enough to go ahead of a poll.
     fn probe_is_due(&self, now: Duration) -> bool {
-        let first = self.waiting[PROBES].first.filter(|_| !self.probed);
-        first.is_some_and(|index| {
-            let Entry { job, since, .. } = &self.slots[index].entry;
-            now.saturating_sub(*since) >= job.timeout.saturating_mul(PROBE_PATIENCE)
+        let mut probes = self.waiting[PROBES].indexes(&self.slots).map(|index| &self.slots[index].entry);
+        probes.any(|entry| {
+            let rest = entry.job.timeout.saturating_mul(PROBE_REST);
+            let rested = self.probed.is_none_or(|probed| now.saturating_sub(probed) >= rest);
+            rested && entry.modest_until.is_some_and(|until| until <= now)
         })
     }
 
@@ -271,16 +268,16 @@ pub(crate) struct Entry {
     pub(crate) since: Duration,
     /// How often it was sent.
     pub(crate) tries: u8,
-    /// It polls a unit of which nobody knows whether it will answer.
-    pub(crate) probe: bool,
+    /// It polls a unit of which nobody knows whether it will answer, and lets polls of others go first until then.
+    pub(crate) modest_until: Option<Duration>,
     pub(crate) waker: Option<Waker>,
 }
 
 impl Entry {
     fn class(&self) -> usize {
-        match self.probe {
-            true => PROBES,
-            false => self.job.priority.index(),
+        match self.modest_until {
+            Some(_) => PROBES,
+            None => self.job.priority.index(),
         }
     }
 }
@@ -386,11 +383,11 @@ mod tests {
             short: false,
             registers: vec![address],
         };
-        Entry { job, since: Duration::ZERO, tries: 0, probe: false, waker: None }
+        Entry { job, since: Duration::ZERO, tries: 0, modest_until: None, waker: None }
     }
 
     fn probe(address: u16) -> Entry {
-        Entry { probe: true, ..entry(Priority::Poll, address) }
+        Entry { modest_until: Some(Duration::from_secs(10)), ..entry(Priority::Poll, address) }
     }
 
     fn address(entry: &Entry) -> u16 {
@@ -453,9 +450,9 @@ mod tests {
         assert_eq!(drain_at(&mut queue, Duration::from_millis(9_999)), [5, 3, 4, 1, 2]);
         queue.push(entry(Priority::Poll, 0));
         assert_eq!(drain(&mut queue), [0]);
-        // Each that has waited long enough makes one poll wait.
+        // One that has waited long enough makes polls wait, and the next one not at once.
         fill(&mut queue);
-        assert_eq!(drain_at(&mut queue, Duration::from_secs(10)), [5, 1, 3, 2, 4]);
+        assert_eq!(drain_at(&mut queue, Duration::from_secs(13)), [5, 1, 3, 4, 2]);
         let gone = queue.push(probe(6));
         queue.cancel(gone);
         assert!(queue.is_empty());

@@ -163,11 +163,12 @@ impl Guarded {
         self.read_all(cx, &clock, wakes);
         // Later than what was read: silence is counted from then.
         let now = clock();
-        if self.port.is_blocked() {
+        // What has ended meanwhile must not leave any more: its caller knows that it has not.
+        if self.port.is_blocked() && self.wire.is_busy() {
             match self.port.poll_rest(cx) {
                 Poll::Ready(Ok(())) => self.wire.sent_rest(),
                 Poll::Ready(Err(cause)) => self.lost(now, cause, wakes),
-                Poll::Pending => {}
+                Poll::Pending => self.wire.sent_only(self.port.sent()),
             }
         }
 
@@ -244,6 +245,12 @@ impl Guarded {
     fn read_answer(&mut self, cx: &mut Context<'_>, clock: impl Fn() -> Duration, wakes: &mut Vec<Waker>) {
         while self.wire.is_busy() {
             if self.read(cx, &clock, wakes).is_pending() {
+                // Behind noise the line is looked at again before the deadline, and that is the task's.
+                let Some(next) = self.wire.next_look() else { return };
+                if self.alarm.is_none_or(|alarm| next < alarm) {
+                    self.reader = None;
+                    wakes.extend(self.task.take());
+                }
                 return;
             }
         }
@@ -289,10 +296,14 @@ impl Guarded {
         };
         let came = filter.received(bytes);
         self.wire.heard(now, bytes.len(), came.echo);
+        let before = self.wire.answers();
         for bytes in [came.held, came.rest] {
             if !bytes.is_empty() {
                 self.wire.received(now, bytes, wakes);
             }
+        }
+        if self.wire.answers() > before {
+            filter.answered();
         }
         if !self.wire.is_busy() {
             let held = filter.give_up();
@@ -307,8 +318,10 @@ impl Guarded {
         if let Some(seen) = &mut self.seen {
             seen.push(Seen::Sent(self.port.frame.clone()));
         }
-        if let Some(filter) = &mut self.echo {
-            filter.sent(&self.port.frame);
+        if let Some(filter) = &mut self.echo
+            && filter.sent(&self.port.frame)
+        {
+            self.wire.expect_echo();
         }
         let sent = self.port.start();
         let whole = !self.port.is_blocked();
@@ -331,5 +344,72 @@ impl Guarded {
         if let Some(seen) = &mut self.seen {
             seen.push(Seen::Closed);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    use tokio::net::{TcpListener, TcpStream};
+    use tokio::time::timeout;
+
+    use super::*;
+    use crate::endpoint::Endpoint;
+    use crate::error::LinkError;
+    use crate::job::{Ask, Priority, Write};
+    use crate::options::Options;
+
+    const LATER: Duration = Duration::from_millis(10);
+
+    /// A connection into which not one more byte fits, and its other end.
+    async fn stuffed() -> (TcpStream, TcpStream, usize) {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let stream = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
+        let peer = listener.accept().await.unwrap().0;
+        let mut stuffed = 0;
+        while timeout(Duration::from_millis(100), stream.writable()).await.is_ok() {
+            stuffed += stream.try_write(&[0xEE; 65_536]).unwrap_or(0);
+        }
+        (stream, peer, stuffed)
+    }
+
+    #[tokio::test]
+    async fn a_write_that_was_called_not_sent_does_not_leave_after_all() {
+        let (stream, mut peer, stuffed) = stuffed().await;
+        let endpoint: Arc<Endpoint> = Arc::new("tcp://192.0.2.1".parse().unwrap());
+        let wire = Wire::new(endpoint, Line::tcp(), &Options::default());
+        let shared = Shared::new(wire, Line::tcp(), false);
+        let mut cx = Context::from_waker(Waker::noop());
+        let mut wakes = Vec::new();
+        let job = Job {
+            unit: 1,
+            ask: Ask::Write(Write::Register { address: 8193, value: 4 }),
+            priority: Priority::Command,
+            timeout: Duration::from_secs(1),
+            spacing: Duration::ZERO,
+            short: false,
+            registers: Vec::new(),
+        };
+        let mut turn = |connected| shared.lock().turn(&mut cx, || LATER, connected, &mut wakes);
+        assert_eq!(turn(None), Step::Connect);
+        turn(Some(Ok(Stream::Tcp(stream))));
+        let ticket = shared.lock().wire.submit(LATER, job, Waker::noop()).unwrap();
+        assert!(matches!(turn(None), Step::Send(_)) && shared.lock().port.is_blocked());
+
+        // The peer breaks the protocol, and takes bytes again.
+        peer.write_all(&[0, 1, 0, 0, 0xFF, 0xFF, 1]).await.unwrap();
+        let mut taken = vec![0; stuffed];
+        peer.read_exact(&mut taken).await.unwrap();
+        while turn(None) != Step::Disconnect {
+            assert!(shared.lock().port.is_blocked(), "nothing may leave before it is decided");
+            tokio::task::yield_now().await;
+        }
+        let outcome = shared.lock().wire.take(&ticket, Waker::noop()).map(|outcome| outcome.result);
+        assert!(matches!(outcome, Poll::Ready(Err(LinkError::Down { .. }))), "{outcome:?}");
+        let mut left = Vec::new();
+        let _ = peer.read_to_end(&mut left).await;
+        assert!(left.is_empty(), "{left:02X?} left");
     }
 }

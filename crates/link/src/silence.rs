@@ -39,11 +39,6 @@ impl Silence {
         self.fallen = 0;
     }
 
-    /// Whether the unit answered when it was asked last.
-    pub(crate) fn is_answering(&self, unit: u8) -> bool {
-        self.answering.contains(unit)
-    }
-
     /// Whether the unit did not answer when it was asked last.
     pub(crate) fn is_silent(&self, unit: u8) -> bool {
         self.silent.contains(unit)
@@ -142,8 +137,8 @@ mod tests {
         silence.timed_out(3);
         assert_eq!((silence.timeouts(), silence.is_dead(LIMIT, [].into_iter())), (1, false));
         silence.answered(2);
-        assert!(silence.is_answering(2) && !silence.is_silent(2));
-        assert!(silence.is_silent(3) && !silence.is_answering(3));
-        assert!(!silence.is_silent(4) && !silence.is_answering(4), "nobody knows");
+        assert!(!silence.is_silent(2));
+        assert!(silence.is_silent(3));
+        assert!(!silence.is_silent(4), "nobody knows");
     }
 }

@@ -33,6 +33,8 @@ pub struct Statistics {
     pub crc_errors: u64,
     /// Bytes that belong to no frame.
     pub garbage_bytes: u64,
+    /// Our own requests that the adapter or converter sent back (RTU).
+    pub echoes: u64,
     /// Connections made after the first one.
     pub reconnects: u64,
     /// Bytes sent.
@@ -41,8 +43,6 @@ pub struct Statistics {
     pub bytes_received: u64,
     /// Polls of silent units that were answered at once, without a frame.
     pub held: u64,
-    /// Own requests that a converter sent back, and that were taken out of what it sent.
-    pub echoes: u64,
     /// Time from a request to its answer.
     pub latency: Latency,
     /// How long the wire has been open.
@@ -129,13 +129,13 @@ pub enum UnitState {
     },
 }
 
-/// How long answers took.
+/// How long answers took. Small, for every unit has one: times are nanoseconds inside.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
     count: u64,
-    total: Duration,
-    min: Duration,
-    max: Duration,
+    total: u64,
+    min: u64,
+    max: u64,
     buckets: [u64; Self::BOUNDS.len() + 1],
 }
 
@@ -163,18 +163,17 @@ impl Latency {
 
     /// The shortest; none before the first answer.
     pub fn min(&self) -> Option<Duration> {
-        (self.count > 0).then_some(self.min)
+        (self.count > 0).then_some(Duration::from_nanos(self.min))
     }
 
     /// The mean; none before the first answer.
     pub fn mean(&self) -> Option<Duration> {
-        let nanos = self.total.as_nanos().checked_div(u128::from(self.count))?;
-        Some(Duration::from_nanos(u64::try_from(nanos).unwrap_or(u64::MAX)))
+        self.total.checked_div(self.count).map(Duration::from_nanos)
     }
 
     /// The longest; none before the first answer.
     pub fn max(&self) -> Option<Duration> {
-        (self.count > 0).then_some(self.max)
+        (self.count > 0).then_some(Duration::from_nanos(self.max))
     }
 
     /// Answers a bucket, shortest first, with the bucket's upper bound.
@@ -190,18 +189,19 @@ impl Latency {
             _ => self.min.min(other.min),
         };
         self.max = self.max.max(other.max);
-        self.total += other.total;
+        self.total = self.total.saturating_add(other.total);
         self.count += other.count;
         self.buckets.iter_mut().zip(other.buckets).for_each(|(bucket, count)| *bucket += count);
     }
 
     pub(crate) fn record(&mut self, latency: Duration) {
+        let nanos = u64::try_from(latency.as_nanos()).unwrap_or(u64::MAX);
         self.min = match self.count {
-            0 => latency,
-            _ => self.min.min(latency),
+            0 => nanos,
+            _ => self.min.min(nanos),
         };
-        self.max = self.max.max(latency);
-        self.total += latency;
+        self.max = self.max.max(nanos);
+        self.total = self.total.saturating_add(nanos);
         self.count += 1;
         let bucket = Self::BOUNDS.partition_point(|bound| *bound < latency);
         self.buckets[bucket] += 1;

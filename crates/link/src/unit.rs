@@ -117,6 +117,11 @@ impl Unit {
         self.missed >= SILENT_AFTER
     }
 
+    /// Whether nobody knows that it will answer: it never has, or not for several times.
+    pub(crate) fn is_doubtful(&self) -> bool {
+        self.is_silent() || self.counts.answers == 0
+    }
+
     /// When it may be asked by somebody who wants this pause between its exchanges.
     pub(crate) fn rested(&self, spacing: Duration) -> Duration {
         match self.counts.requests {
@@ -240,6 +245,6 @@ mod tests {
     #[test]
     fn one_record_is_small() {
         // Ten thousand wires with one unit each have one of these each.
-        assert!(size_of::<Unit>() <= 400, "{}", size_of::<Unit>());
+        assert!(size_of::<Unit>() <= 352, "{}", size_of::<Unit>());
     }
 }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::task::{Poll, Waker};
 use std::time::Duration;
 
+use busbar_modbus::client::DEFAULT_QUIET;
 use busbar_modbus::{Client, Progress};
 
 use crate::doubt::Doubts;
@@ -21,13 +22,21 @@ use crate::options::{Backoff, Options};
 use crate::queue::{Entry, Pick, Place, Queue, Ticket, Turn};
 use crate::silence::Silence;
 use crate::statistics::Statistics;
-use crate::unit::Units;
+use crate::unit::{Unit, Units};
 use exchange::{Exchange, Sent};
 
 pub(crate) use connection::Phase;
 
 /// Longer waits are cut to this, so that no sum of times overflows.
 const LONGEST_WAIT: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// Who waits for a silent line waits so long at least: what is late may take as long.
+const LEAST_PATIENCE: Duration = DEFAULT_QUIET.saturating_mul(2);
+
+/// A poll of a unit that never answered goes ahead of another once it has waited so many of its time-outs, and one of a
+/// silent unit after so many.
+const NEW_PATIENCE: u32 = 3;
+const SILENT_PATIENCE: u32 = 10;
 
 /// One wire: what waits, what is under way, and what state the connection is in.
 #[derive(Debug)]
@@ -43,6 +52,8 @@ pub(crate) struct Wire {
     together: Option<Place>,
     /// No request leaves before this: spacing, and the silence of the line.
     earliest: Duration,
+    /// RTU: since when bytes that nobody asked for have kept the next request from leaving.
+    disturbed: Option<Duration>,
     units: Units,
     silence: Silence,
     /// When the first request left since anybody answered.
@@ -65,7 +76,7 @@ pub(crate) struct Wire {
     unasked_bytes: u64,
     /// Bad checksums and bytes of no frame that were put down to somebody.
     damage: (u64, u64),
-    /// Own requests that came back; the port takes them out.
+    /// Own requests that came back and were found on the way in; the client has others.
     echoes: u64,
 }
 
@@ -88,6 +99,7 @@ impl Wire {
             exchange: None,
             together: None,
             earliest: Duration::ZERO,
+            disturbed: None,
             units: Units::default(),
             silence: Silence::default(),
             unanswered_since: None,
@@ -115,8 +127,10 @@ impl Wire {
         }
         let (timeout, spacing) = (job.timeout.min(LONGEST_WAIT), job.spacing.min(LONGEST_WAIT));
         let job = Job { timeout, spacing, ..job };
-        let probe = job.priority == Priority::Poll && !self.silence.is_answering(job.unit);
-        Ok(self.queue.push(Entry { job, since: now, tries: 0, probe, waker: Some(waker.clone()) }))
+        let is_poll = job.priority == Priority::Poll;
+        let modest_until = is_poll.then(|| self.modest_until(now, job.unit, job.timeout)).flatten();
+        let waker = Some(waker.clone());
+        Ok(self.queue.push(Entry { job, since: now, tries: 0, modest_until, waker }))
     }
 
     /// The outcome of a job if there is one; otherwise `waker` will be woken for it.
@@ -182,7 +196,7 @@ impl Wire {
             garbage_bytes: seen.garbage_bytes,
             bytes_received: self.unasked_bytes,
             reconnects: self.connections.saturating_sub(1),
-            echoes: self.echoes,
+            echoes: self.echoes + seen.echoes,
             open_for: now,
             ..Statistics::default()
         };
@@ -201,7 +215,7 @@ impl Wire {
     /// one. The line has to be silent after them.
     pub(crate) fn heard(&mut self, now: Duration, bytes: usize, echo: Option<usize>) {
         self.echoes += u64::from(echo.is_some());
-        self.earliest = self.earliest.max(now + self.line.silence);
+        self.break_silence(now);
         if let Some(exchange) = &mut self.exchange {
             exchange.ear.hears(bytes, echo);
         }
@@ -222,6 +236,21 @@ impl Wire {
         if self.client.fault().is_some() {
             self.hang_up(now, Cause::Garbage, wakes);
         }
+    }
+
+    /// The line echoes, and the request that leaves looks like its confirmation.
+    pub(crate) fn expect_echo(&mut self) {
+        self.client.ignore_echo();
+    }
+
+    /// Answers on this connection.
+    pub(crate) fn answers(&self) -> u64 {
+        self.answers
+    }
+
+    /// When what came is looked at again, if not only at the deadline.
+    pub(crate) fn next_look(&self) -> Option<Duration> {
+        self.exchange.as_ref().and_then(Exchange::next_look)
     }
 
     /// The system took only `bytes` of the request so far.
@@ -341,11 +370,11 @@ impl Wire {
         if self.closed || self.hang_up || !free {
             return Start::Wait(None);
         }
-        let ready = self.client.quiet_until().map_or(self.earliest, |until| until.max(self.earliest));
+        let ready = self.ready();
         if now < ready {
-            let somebody_waits = self.together.is_some() || !self.queue.is_empty();
-            return Start::Wait(somebody_waits.then_some(ready));
+            return Start::Wait(self.wait_for_silence(now, wakes).map(|until| until.min(ready)));
         }
+        self.disturbed = None;
         loop {
             let place = match self.pick(now) {
                 Pick::Job(place) => place,
@@ -357,6 +386,55 @@ impl Wire {
                 Err(error) => self.queue.finish(place, Err(error), wakes),
             }
         }
+    }
+
+    /// When the next request may leave if the line stays silent.
+    fn ready(&self) -> Duration {
+        self.client.quiet_until().map_or(self.earliest, |until| until.max(self.earliest))
+    }
+
+    /// RTU: something is on the line, which has to be silent after it.
+    fn break_silence(&mut self, now: Duration) {
+        let silent = now + self.line.silence;
+        if self.exchange.is_none() && silent > self.earliest {
+            match now < self.ready() {
+                true => self.disturbed.get_or_insert(now),
+                false => self.disturbed.insert(now),
+            };
+        }
+        self.earliest = self.earliest.max(silent);
+    }
+
+    /// On a line that never falls silent nobody waits for longer than for an answer. Says when the next one will have.
+    fn wait_for_silence(&mut self, now: Duration, wakes: &mut Vec<Waker>) -> Option<Duration> {
+        let Some(since) = self.disturbed else {
+            let somebody_waits = self.together.is_some() || !self.queue.is_empty();
+            return somebody_waits.then_some(Duration::MAX);
+        };
+        let until = |entry: &Entry| entry.since.max(since) + entry.job.timeout.max(LEAST_PATIENCE);
+        let judge = |entry: &Entry| {
+            let Job { unit, timeout: after, .. } = entry.job;
+            (until(entry) <= now).then_some(LinkError::NeverSilent { unit, after })
+        };
+        self.queue.fail_waiting(judge, wakes);
+        if let Some(place) = self.together
+            && let Some(error) = self.queue.entry(place).and_then(|entry| judge(entry))
+        {
+            self.together = None;
+            self.queue.finish(place, Err(error), wakes);
+        }
+        let together = self.together.map(|place| self.queue.entry(place).map_or(now, |entry| until(entry)));
+        self.queue.waiting().map(until).chain(together).min()
+    }
+
+    /// Until when a poll lets those of others go first, if nobody knows whether its unit will answer.
+    fn modest_until(&self, now: Duration, unit: u8, timeout: Duration) -> Option<Duration> {
+        let unit = self.units.get(unit);
+        let timeouts = match unit.is_some_and(Unit::is_silent) {
+            true => SILENT_PATIENCE,
+            false => NEW_PATIENCE,
+        };
+        unit.is_none_or(Unit::is_doubtful).then(|| now + timeout.saturating_mul(timeouts))
     }
 
     fn pick(&mut self, now: Duration) -> Pick {
@@ -440,6 +518,8 @@ fn silent(now: Duration, unit: u8, next_probe: Duration) -> LinkError {
 
 #[cfg(test)]
 mod lateness;
+#[cfg(test)]
+mod noise;
 #[cfg(test)]
 mod pace;
 #[cfg(test)]

@@ -48,6 +48,8 @@ pub struct Counters {
     pub crc_errors: u64,
     /// Bytes that belong to no frame.
     pub garbage_bytes: u64,
+    /// RTU: own requests that came back and were not taken for their answers, see [`Client::ignore_echo`].
+    pub echoes: u64,
 }
 
 /// A whole frame that was taken for no answer.
@@ -104,6 +106,8 @@ struct Waiting {
     unit: u8,
     expected: Expected,
     deadline: Duration,
+    /// The first copy of the request is its echo.
+    echo: bool,
 }
 
 impl Client {
@@ -182,6 +186,7 @@ impl Client {
             unit,
             expected: Expected::of(request),
             deadline: now.saturating_add(timeout),
+            echo: false,
         });
         Ok(())
     }
@@ -194,6 +199,14 @@ impl Client {
     pub fn accept_short(&mut self) {
         if let State::Waiting(waiting) = &mut self.state {
             waiting.expected = waiting.expected.or_short();
+        }
+    }
+
+    /// RTU, functions 5 and 6: the adapter sends our own request back, which looks just like its confirmation. The first
+    /// such frame is not taken for it. To be called behind [`start`](Self::start), for each transaction anew.
+    pub fn ignore_echo(&mut self) {
+        if let State::Waiting(waiting) = &mut self.state {
+            waiting.echo = true;
         }
     }
 

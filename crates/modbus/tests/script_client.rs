@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use busbar_modbus::{
     Bits, Client, Counters, EncodeError, ExceptionCode, Fault, Framing, Progress, Request, Response,
-    StartError,
+    StartError, Stray,
 };
 use support::{hex, ms};
 
@@ -561,6 +561,24 @@ fn rtu_silence_ends_what_hides_the_answer() {
 }
 
 #[test]
+fn rtu_an_echo_is_no_confirmation() {
+    const ASKED: &str = "01 06 00 40 00 10 88 12";
+    let mut client = Client::new(Framing::Rtu);
+    play(&mut client, &[Ask(0, WRITE, ASKED)]);
+    client.ignore_echo();
+    // With noise in front and in pieces: nothing but a second copy confirms it.
+    play(&mut client, &[Come(10, "FF 01 06 00", Pending), Come(12, "40 00 10 88 12", Pending), NoResponse]);
+    play(&mut client, &[Come(30, ASKED, Answered)]);
+    assert_eq!(client.counters(), &counted(|counters| (counters.echoes, counters.garbage_bytes) = (1, 1)));
+
+    // The device may refuse, and the next transaction begins anew.
+    play(&mut client, &[Ask(100, WRITE, ASKED)]);
+    client.ignore_echo();
+    play(&mut client, &[Come(110, "01 86 02 C3 A1", Answered), Ask(200, WRITE, ASKED)]);
+    play(&mut client, &[Come(210, ASKED, Answered)]);
+}
+
+#[test]
 fn rtu_does_not_broadcast() {
     let mut client = Client::new(Framing::Rtu);
     let mut out = Vec::new();
@@ -568,4 +586,22 @@ fn rtu_does_not_broadcast() {
     assert_eq!((out.len(), client.deadline()), (0, None));
     // Over TCP unit 0 is an address like any other.
     assert_eq!(Client::new(Framing::Tcp).start(ms(0), 0, &WRITE, ms(1), &mut out), Ok(()));
+}
+
+#[test]
+fn strays_say_whose_they_were() {
+    let mut client = run(
+        Framing::Tcp,
+        &[
+            Ask(0, READ, "0001 0000 0006 01 03 0020 0002"),
+            // Another unit's exception, then the answer, then one to a transaction long gone.
+            Come(1, "0001 0000 0003 02 83 04", Pending),
+            Come(2, "0001 0000 0007 01 03 04 0001 0002", Answered),
+            Come(3, "FFFF 0000 0005 01 04 02 0001", Pending),
+        ],
+    );
+    let stray = |unit, function, pdu_len, exception| Some(Stray { unit, function, pdu_len, exception });
+    assert_eq!(client.take_stray(), stray(1, 4, 4, false));
+    assert_eq!(client.take_stray(), stray(2, 3, 2, true));
+    assert_eq!(client.take_stray(), None);
 }

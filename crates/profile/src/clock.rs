@@ -32,6 +32,9 @@ pub struct ParseDateTimeError {
 }
 
 impl DateTime {
+    /// The first instant of 2000, a Saturday.
+    pub const FIRST: Self = Self { since: Duration::ZERO };
+
     /// None unless it is a day of the calendar from 2000 to 2100 and a time of a day.
     pub fn new(year: u16, month: u16, day: u16, hour: u16, minute: u16, second: u16) -> Option<Self> {
         let in_range = (EPOCH..=LAST).contains(&year)

@@ -319,8 +319,20 @@ pub(crate) struct BitFile {
     pub(crate) signal: Option<At<String>>,
     /// The word of the point's signal that it stands for.
     pub(crate) state: Option<At<String>>,
+    /// What it stands for while it is clear, where it alone tells the state.
+    pub(crate) clear: Option<At<ClearFile>>,
     /// What the manual leaves open.
     pub(crate) doubt: Option<String>,
+}
+
+/// What a bit stands for while it is clear.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ClearFile {
+    /// Its label.
+    pub(crate) label: String,
+    /// The word of the point's signal.
+    pub(crate) state: At<String>,
 }
 
 /// Points that belong together on a page.

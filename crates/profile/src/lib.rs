@@ -50,7 +50,7 @@ pub use findings::{Collector, Finding, Findings};
 pub use image::Image;
 pub use joined::{Joined, JoinedParts, JoinedReading, JoinedValue};
 pub use number::{Number, ParseNumberError, Scale};
-pub use point::{Bit, Choice, Point};
+pub use point::{Bit, Choice, Clear, Point};
 pub use profile::{
     Coil, ExceptionName, Group, Identity, IdentityModel, Manual, Profile, SerialSettings, UnitRange, Wire,
 };

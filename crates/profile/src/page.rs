@@ -293,6 +293,13 @@ impl<'a> Lists<'a> {
             let mut table = Table::new(&["Bit", "Id", "Label", "Class", "Signal", "State", "Notes"]);
             for bit in &point.bits {
                 let class = bit.class.filter(|_| mixed).map(|class| class.to_string());
+                let mut notes = Vec::new();
+                if let Some(clear) = &bit.clear {
+                    notes.push(format!("while clear: {} ({})", escape(&clear.label), clear.state));
+                }
+                if let Some(doubt) = &bit.doubt {
+                    notes.push(format!("in doubt: {}", escape(doubt)));
+                }
                 table.row([
                     bit.bit.to_string(),
                     code(&bit.id),
@@ -300,10 +307,7 @@ impl<'a> Lists<'a> {
                     class.unwrap_or_default(),
                     bit.signal.as_deref().map(code).unwrap_or_default(),
                     bit.state.clone().unwrap_or_default(),
-                    bit.doubt
-                        .as_ref()
-                        .map(|doubt| format!("in doubt: {}", escape(doubt)))
-                        .unwrap_or_default(),
+                    notes.join("; "),
                 ]);
             }
             text.push_str(&under(points, table, text.is_empty()));

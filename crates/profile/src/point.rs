@@ -191,6 +191,18 @@ pub struct Bit {
     pub signal: Option<String>,
     /// The word of the point's signal that it stands for.
     pub state: Option<String>,
+    /// What it stands for while it is clear, where it alone tells the state.
+    pub clear: Option<Clear>,
     /// What the manual leaves open.
     pub doubt: Option<String>,
+}
+
+/// What a bit stands for while it is clear.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Clear {
+    /// Its label.
+    pub label: String,
+    /// The word of the point's signal.
+    pub state: String,
 }

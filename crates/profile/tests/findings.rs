@@ -198,6 +198,15 @@ fn lists() {
             ("signal = \"breaker.genset.closed\"", "signal = \"breaker.gen.closed\""),
             ("signal = \"breaker.genset.closed\"", "signal = \"mode\""),
             ("signal = \"breaker.genset.closed\"", "state = \"running\""),
+            ("signal = \"breaker.genset.closed\"", "clear = { label = \"Open \", state = \"stopped\" }"),
+            (
+                "signal = \"breaker.genset.closed\"",
+                "state = \"running\", clear = { label = \"Open\", state = \"running\" }",
+            ),
+            (
+                "label = \"Load test\" },",
+                "label = \"Load test\", state = \"running\" },\n  { bit = 4, id = \"other\", label = \"On\", state = \"cranking\", clear = { label = \"Off\", state = \"stopped\" } },",
+            ),
         ]),
     );
 }

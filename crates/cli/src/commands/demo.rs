@@ -124,6 +124,7 @@ fn imitated(member: &Member) -> Config {
         unit: member.unit,
         model: Some(member.model.to_owned()),
         story: true,
+        epoch: emulate::today(),
         ..Config::default()
     }
 }

@@ -2,9 +2,11 @@
 
 use busbar_emulator::{Config, StartError};
 use busbar_link::Endpoint;
+use busbar_profile::DateTime;
+use jiff::Zoned;
 use serde::Serialize;
 
-use crate::{args, failure::Failure, logging, profiles, runtime, terminal};
+use crate::{args, failure::Failure, logging, profiles, runtime, terminal, wall_clock};
 
 /// Where it answers, as `--json` prints it.
 #[derive(Serialize)]
@@ -15,15 +17,18 @@ struct Bound<'a> {
 pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
     logging::start("warn")?;
     let profile = profiles::resolve(&args.key)?;
+    let usual = Config::default();
     let config = Config {
         unit: args.unit.or(profile.wire.unit.default).unwrap_or(1),
         profile: args.key,
         model: args.model,
         listen: args.listen.into_iter().chain(args.more).collect(),
-        seed: args.seed,
+        seed: args.seed.unwrap_or(usual.seed),
+        // Who names a seed wants the same registers every time, the calendar's too.
+        epoch: if args.seed.is_some() { usual.epoch } else { today() },
         speed: args.speed,
         pins: args.set,
-        ..Config::default()
+        ..usual
     };
     runtime::service(async |mut stop| {
         let emulation = busbar_emulator::start(config).await.map_err(failure)?;
@@ -37,6 +42,11 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
         emulation.stop().await;
         Ok(())
     })
+}
+
+/// What a calendar says that was set by this machine's clock.
+pub(crate) fn today() -> DateTime {
+    wall_clock::local(&Zoned::now()).unwrap_or(Config::default().epoch)
 }
 
 /// What the machine refuses is a failure; everything else was asked for wrongly.

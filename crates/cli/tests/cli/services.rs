@@ -63,6 +63,26 @@ fn emulate_has_one_json_document() {
     busbar(&format!("registers {url} 10609 1")).ok();
 }
 
+/// Year, month and day of an imitated DKG-705.
+fn date(options: &str) -> String {
+    let call = format!("emulate datakom-dkg705 --listen tcp://127.0.0.1:0 {options}");
+    let mut service = Service::start(call.split_whitespace());
+    let read =
+        format!("read datakom-dkg705 clock_year clock_month clock_day --from {} --unit 1", service.line());
+    let readings = busbar(&format!("{read} --json")).ok().json();
+    let part = |at: usize| readings[at]["value"].as_u64().unwrap();
+    format!("20{:02}-{:02}-{:02}", part(0), part(1), part(2))
+}
+
+#[test]
+fn emulate_starts_a_calendar_today_and_with_a_seed_at_a_fixed_day() {
+    assert_eq!([date("--seed 1"), date("--seed 7")], ["2026-01-05", "2026-01-05"]);
+    let today = || jiff::Zoned::now().date().to_string();
+    // A day may end in between.
+    let (before, shown, after) = (today(), date(""), today());
+    assert!(shown == before || shown == after, "{shown}, not {before} or {after}");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn emulate_makes_a_pseudo_terminal_and_speaks_rtu_through_tcp() {

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use busbar_profile::{DateTime, TimePart};
+
 /// Year, month, day, hour, minute and second, in the order of the registers.
 ///
 /// A date that the calendar does not have can stand here between two writes; it lasts until midnight.
@@ -23,8 +25,12 @@ const SECOND: usize = 5;
 const RANGES: [(u8, u8); 6] = [(0, 99), (1, 12), (1, 31), (0, 23), (0, 59), (0, 59)];
 
 impl Clock {
-    /// When every imitation is switched on: the plant's weather begins at ten in the morning.
-    pub(super) const POWER_ON: Self = Self { parts: [26, 1, 1, 10, 0, 0], passed: Duration::ZERO };
+    /// A clock that begins a second at `time`; it has two digits for the year.
+    pub(super) fn at(time: DateTime) -> Self {
+        use TimePart::{Day, Hour, Minute, Month, Second, Year};
+        let parts = [Year, Month, Day, Hour, Minute, Second].map(|part| (time.part(part) % 100) as u8);
+        Self { parts, passed: Duration::ZERO }
+    }
 
     pub(super) fn parts(&self) -> [u8; 6] {
         self.parts
@@ -86,6 +92,13 @@ mod tests {
     }
 
     #[test]
+    fn it_starts_at_any_time_and_keeps_two_digits_of_the_year() {
+        let parts = |time: &str| Clock::at(time.parse().unwrap()).parts();
+        assert_eq!(parts("2031-12-24T18:59:07"), [31, 12, 24, 18, 59, 7]);
+        assert_eq!(parts("2100-02-28T00:00:00"), [0, 2, 28, 0, 0, 0]);
+    }
+
+    #[test]
     fn it_carries_as_the_calendar_does() {
         assert_eq!(after([26, 1, 1, 10, 0, 58], 3), [26, 1, 1, 10, 1, 1]);
         assert_eq!(after([26, 12, 31, 23, 59, 59], 1), [27, 1, 1, 0, 0, 0]);
@@ -103,7 +116,7 @@ mod tests {
 
     #[test]
     fn tenths_add_up_to_seconds_and_a_new_second_begins_when_it_is_set() {
-        let mut clock = Clock::POWER_ON;
+        let mut clock = Clock::at("2026-01-01T10:00:00".parse().unwrap());
         for _ in 0..19 {
             clock.step(Duration::from_millis(100));
         }

@@ -1,6 +1,6 @@
 //! Datakom DKG-705: modes, clock and the situation the unit is in.
 //!
-//! Power-on finds the unit in AUTO with healthy mains that carry the load, on 1 January 2026 at ten in the morning.
+//! Power-on finds the unit in AUTO with healthy mains that carry the load.
 //! Where the manual is silent this is what the imitation does:
 //! - 8-bit registers take the low byte of a word; a mode is chosen by exactly one key, other words have no effect;
 //! - each number of the clock counts at once if it is in its own range; a date that does not exist lasts till midnight;
@@ -34,6 +34,7 @@ mod story;
 use std::time::Duration;
 
 use busbar_modbus::ExceptionCode;
+use busbar_profile::DateTime;
 
 use crate::bank::Bank;
 use crate::panel::Panel;
@@ -124,7 +125,7 @@ impl DatakomDkg705 {
             regulation: Regulation::new(&mut plant),
             alarms: Alarms::default(),
             ecu: Ecu::new(&plant),
-            clock: Clock::POWER_ON,
+            clock: Clock::at(DateTime::FIRST),
             mode: Mode::Auto,
             controls: Controls { mains_breaker: true, ..Controls::default() },
             block_heater: false,
@@ -135,6 +136,11 @@ impl DatakomDkg705 {
             days_before: random.between(20.0, 90.0),
             plant,
         }
+    }
+
+    /// The same unit with its clock set.
+    pub(crate) fn starting(self, epoch: DateTime) -> Self {
+        Self { clock: Clock::at(epoch), ..self }
     }
 
     fn press(&mut self, keys: u8) {

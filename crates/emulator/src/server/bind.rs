@@ -3,14 +3,13 @@
 use std::io;
 use std::sync::Arc;
 
-use busbar_link::{Endpoint, Serial, SerialPort};
+use busbar_link::{Endpoint, LineTimer, Serial, SerialPort};
 use tokio::net::{TcpListener, lookup_host};
 use tokio::task::JoinSet;
 
 use super::door::Door;
 use super::serial::{self, Port};
 use super::tcp;
-use super::timer::Timer;
 use crate::error::StartError;
 
 /// What stands for a new pseudo-terminal where a device path could stand.
@@ -20,7 +19,7 @@ const NEW_PTY: &str = "pty";
 #[derive(Debug)]
 pub(super) enum Socket {
     Listener(TcpListener),
-    Line { port: Port, timer: Timer, serial: Serial },
+    Line { port: Port, timer: LineTimer, serial: Serial },
 }
 
 impl Socket {
@@ -36,7 +35,6 @@ impl Socket {
                 Ok((Endpoint::RtuTcp { host, port }, Self::Listener(listener)))
             }
             Endpoint::Rtu { path, serial } => {
-                let timer = Timer::new().map_err(|error| refused(endpoint, &error))?;
                 let (port, path) = match path.as_str() {
                     NEW_PTY => pseudo(endpoint, serial)?,
                     path => {
@@ -47,7 +45,7 @@ impl Socket {
                     }
                 };
                 let (serial, url) = (*serial, Endpoint::Rtu { path, serial: *serial });
-                Ok((url, Self::Line { port, timer, serial }))
+                Ok((url, Self::Line { port, timer: LineTimer::new(), serial }))
             }
             _ => Err(StartError::Transport { endpoint: endpoint.clone() }),
         }

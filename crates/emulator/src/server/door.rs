@@ -112,13 +112,18 @@ impl Door {
     /// Appends the answer to one frame, if there is one.
     pub(super) fn answer(&self, frame: &Frame<'_>, out: &mut Vec<u8>) -> Option<Outcome> {
         let framing = self.framing();
-        let Some(request) = request(framing, frame.pdu) else {
+        let Some(request) = request(frame.pdu) else {
             self.statistics().garbage += 1;
             return None;
         };
+        let member = self.devices.iter().find(|(unit, _)| *unit == frame.unit);
+        let mut device = member.map(|(_, served)| served.lock());
+        if device.as_ref().is_some_and(|device| device.is_malformed(&request)) {
+            self.statistics().garbage += 1;
+            return None;
+        }
         self.statistics().requests += 1;
-        let (_, served) = self.devices.iter().find(|(unit, _)| *unit == frame.unit)?;
-        let mut device = served.lock();
+        let device = device.as_mut()?;
         let response = device.answer(frame.unit, &request)?;
         if !encode(framing, frame, &response, out) {
             return None;
@@ -144,13 +149,12 @@ impl Outcome {
     }
 }
 
-/// What a client asks. Over TCP function 0 gets the answer of any other that a device does not have; on RTU it never
-/// becomes a frame.
-fn request(framing: Framing, pdu: &[u8]) -> Option<Request<'_>> {
-    match (framing, pdu) {
-        (Framing::Tcp, [0, data @ ..]) => Some(Request::Other { function: 0, data }),
-        _ => Request::decode(pdu).ok(),
-    }
+/// What a client asks. A device judges the function before the rest: one that it does not have gets its exception
+/// whatever follows, function 0 too, which only TCP can carry.
+fn request(pdu: &[u8]) -> Option<Request<'_>> {
+    let (&function, data) = pdu.split_first()?;
+    let odd = (function < EXCEPTION_BIT).then_some(Request::Other { function, data });
+    Request::decode(pdu).ok().or(odd)
 }
 
 fn encode(framing: Framing, frame: &Frame<'_>, response: &Response<'_>, out: &mut Vec<u8>) -> bool {

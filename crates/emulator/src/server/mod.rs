@@ -6,7 +6,6 @@ mod line;
 mod pty;
 mod serial;
 mod tcp;
-mod timer;
 
 #[cfg(test)]
 mod tests;

@@ -4,7 +4,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use busbar_link::{Endpoint, Serial, SerialPort};
+use busbar_link::{Endpoint, LineTimer, Serial, SerialPort};
 use busbar_modbus::stream::Frame;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::time::{sleep, timeout};
@@ -14,7 +14,6 @@ use super::door::Door;
 use super::line::Line;
 #[cfg(target_os = "linux")]
 use super::pty::Pty;
-use super::timer::Timer;
 
 /// How often a device that went away, such as a USB adapter, is looked for.
 const RETRY: Duration = Duration::from_secs(1);
@@ -61,7 +60,7 @@ impl Port {
 }
 
 /// Serves one line until it is dropped, and again when its device is back.
-pub(super) async fn serve(mut port: Port, mut timer: Timer, serial: Serial, door: Arc<Door>) {
+pub(super) async fn serve(mut port: Port, mut timer: LineTimer, serial: Serial, door: Arc<Door>) {
     loop {
         let Err(error) = attend(&mut port, &mut timer, &serial, &door).await;
         tracing::warn!(%error, endpoint = %door.endpoint, "an imitated controller lost its serial device");
@@ -94,7 +93,7 @@ async fn reopen(endpoint: &Endpoint, serial: &Serial) -> Port {
 
 async fn attend(
     port: &mut Port,
-    timer: &mut Timer,
+    timer: &mut LineTimer,
     serial: &Serial,
     door: &Door,
 ) -> io::Result<std::convert::Infallible> {
@@ -128,12 +127,12 @@ async fn attend(
             count = port.read(&mut buffer) => {
                 line.receive(start.elapsed(), buffer.get(..count?).unwrap_or_default());
             }
-            kept = async {
+            () = async {
                 match deadline {
                     Some(deadline) => timer.until(deadline).await,
                     None => std::future::pending().await,
                 }
-            } => kept?,
+            } => {}
         }
     }
 }

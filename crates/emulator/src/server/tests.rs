@@ -1,27 +1,29 @@
-//! Devices that take their time.
+//! The DKG-705 takes its time: no wire has its answer before.
 
 use std::time::{Duration, Instant};
 
-use busbar_link::Endpoint;
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use busbar_link::{Endpoint, SerialPort};
+use busbar_modbus::rtu::crc16;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 
-use super::{Emulation, serve};
+use super::{Emulation, start};
 use crate::config::Config;
-use crate::device::Device;
 
 const PATIENCE: Duration = Duration::from_secs(10);
-/// What a DKG takes at least.
+/// At least so long after a request (manual, page 1).
 const DELAY: Duration = Duration::from_micros(4300);
-/// 10609 of unit 1, and how it is answered.
-const ASK: [u8; 8] = [0x01, 0x03, 0x29, 0x71, 0x00, 0x01, 0xDC, 0x4D];
-const TOLD: [u8; 5] = [0x01, 0x03, 0x02, 0xD5, 0x00];
+/// One character at 9600 baud, 8N1.
+const CHARACTER: Duration = Duration::from_nanos(1_041_666);
 
-async fn slow(endpoint: &str) -> Emulation {
-    let config = Config::default();
-    let device = Device::new(&config).unwrap().with_answer_delay(DELAY);
-    serve(&[config], vec![device], &[endpoint.parse().unwrap()]).await.unwrap()
+/// A read, a write and an exception, each with the length of its answer's PDU.
+const EXCHANGES: [(&[u8], usize); 3] =
+    [(&[3, 0, 0, 0, 16], 34), (&[6, 0, 0x40, 0, 0x10], 5), (&[3, 0, 0x38, 0, 1], 2)];
+
+async fn dkg(endpoint: &str) -> Emulation {
+    let listen = vec![endpoint.parse().unwrap()];
+    start(Config { profile: "datakom-dkg705".into(), listen, ..Config::default() }).await.unwrap()
 }
 
 async fn connect(emulation: &Emulation) -> TcpStream {
@@ -31,25 +33,54 @@ async fn connect(emulation: &Emulation) -> TcpStream {
     TcpStream::connect((host.as_str(), *port)).await.unwrap()
 }
 
+fn rtu(pdu: &[u8]) -> Vec<u8> {
+    let body = [&[1], pdu].concat();
+    [&body[..], &crc16(&body).to_le_bytes()].concat()
+}
+
+/// How long until the first byte of the answer is there, and until the last one is.
+async fn ask(wire: &mut (impl AsyncRead + AsyncWrite + Unpin), frame: &[u8], length: usize) -> [Duration; 2] {
+    let mut bytes = vec![0; length];
+    let asked = Instant::now();
+    wire.write_all(frame).await.unwrap();
+    timeout(PATIENCE, wire.read_exact(&mut bytes[..1])).await.unwrap().unwrap();
+    let first = asked.elapsed();
+    timeout(PATIENCE, wire.read_exact(&mut bytes[1..])).await.unwrap().unwrap();
+    [first, asked.elapsed()]
+}
+
 #[tokio::test]
-async fn no_answer_comes_before_the_delay_of_its_device() {
-    let frame = [&[0, 1, 0, 0, 0, 6][..], &ASK[..6]].concat();
-    for (endpoint, request, answer) in [
-        ("tcp://127.0.0.1:0", frame.as_slice(), [&[0, 1, 0, 0, 0, 5][..], &TOLD].concat()),
-        ("rtu+tcp://127.0.0.1:0", ASK.as_slice(), TOLD.to_vec()),
-    ] {
-        let emulation = slow(endpoint).await;
-        let mut stream = connect(&emulation).await;
-        for _ in 0..5 {
-            let asked = Instant::now();
-            stream.write_all(request).await.unwrap();
-            let mut bytes = vec![0; answer.len()];
-            timeout(PATIENCE, stream.read_exact(&mut bytes)).await.unwrap().unwrap();
-            assert!(asked.elapsed() >= DELAY, "{endpoint}: {:?}", asked.elapsed());
-            assert_eq!(bytes, answer, "{endpoint}");
-            if endpoint.starts_with("rtu") {
-                timeout(PATIENCE, stream.read_exact(&mut [0; 2])).await.unwrap().unwrap();
-            }
-        }
+async fn no_answer_comes_before_its_delay_over_tcp() {
+    let emulation = dkg("tcp://127.0.0.1:0").await;
+    let mut stream = connect(&emulation).await;
+    for (pdu, answer) in EXCHANGES {
+        let frame = [&[0, 1, 0, 0, 0, pdu.len() as u8 + 1, 1], pdu].concat();
+        let [first, _] = ask(&mut stream, &frame, 7 + answer).await;
+        assert!(first >= DELAY, "{pdu:02X?}: {first:?}");
+    }
+}
+
+#[tokio::test]
+async fn no_answer_comes_before_its_delay_through_a_converter() {
+    let emulation = dkg("rtu+tcp://127.0.0.1:0").await;
+    let mut stream = connect(&emulation).await;
+    for (pdu, answer) in EXCHANGES {
+        let [first, _] = ask(&mut stream, &rtu(pdu), 3 + answer).await;
+        assert!(first >= DELAY, "{pdu:02X?}: {first:?}");
+    }
+}
+
+/// The delay is longer than the silence of the line, and takes its place.
+#[cfg(target_os = "linux")]
+#[tokio::test]
+async fn no_answer_comes_before_its_delay_on_a_line() {
+    let emulation = dkg("rtu://pty?baud=9600").await;
+    let Endpoint::Rtu { path, serial } = &emulation.urls()[0] else { panic!() };
+    let mut port = SerialPort::open(path, serial).unwrap();
+    for (pdu, answer) in EXCHANGES {
+        let asked = CHARACTER * 8 + DELAY;
+        let [first, last] = ask(&mut port, &rtu(pdu), 3 + answer).await;
+        assert!(first >= asked + CHARACTER, "{pdu:02X?}: {first:?}");
+        assert!(last >= asked + CHARACTER * (3 + answer as u32), "{pdu:02X?}: {last:?}");
     }
 }

@@ -41,17 +41,11 @@ pub(super) fn parts(time: Duration) -> [i64; 3] {
     [seconds / 3600, seconds / 60 % 60, seconds % 60].map(|part| part as i64)
 }
 
-/// Year, month, day, day of the week (0 is Sunday), hour, minute and second after this much time in service. A
-/// controller is switched on at ten in the morning of Monday, 5 January 2026.
-pub(super) fn calendar(passed: Duration) -> [i64; 7] {
+/// Year, month, day, day of the week (0 is Sunday), hour, minute and second.
+pub(super) fn calendar(now: DateTime) -> [i64; 7] {
     const DAY: u64 = 86_400;
-    let (Some(switched_on), Some(sunday)) =
-        (DateTime::new(2026, 1, 5, 10, 0, 0), DateTime::new(2026, 1, 4, 0, 0, 0))
-    else {
-        return [0; 7];
-    };
-    let now = switched_on.plus(passed);
-    let weekday = now.distance(sunday).as_secs() / DAY % 7;
+    const SATURDAY: u64 = 6;
+    let weekday = (now.distance(DateTime::FIRST).as_secs() / DAY + SATURDAY) % 7;
     let part = |part| i64::from(now.part(part));
     [
         part(TimePart::Year),
@@ -87,11 +81,11 @@ mod tests {
     }
 
     #[test]
-    fn the_calendar_runs_on_over_days_and_months() {
-        let hours = |hours: u64| Duration::from_secs(hours * 3600);
-        assert_eq!(calendar(Duration::ZERO), [26, 1, 5, 1, 10, 0, 0]);
-        assert_eq!(calendar(hours(14)), [26, 1, 6, 2, 0, 0, 0]);
-        assert_eq!(calendar(hours(6 * 24) + Duration::from_millis(61_900)), [26, 1, 11, 0, 10, 1, 1]);
-        assert_eq!(calendar(hours(27 * 24)), [26, 2, 1, 0, 10, 0, 0]);
+    fn the_calendar_knows_the_day_of_the_week() {
+        let at = |time: &str| calendar(time.parse().unwrap());
+        assert_eq!(at("2026-01-05T10:00:00"), [26, 1, 5, 1, 10, 0, 0]);
+        assert_eq!(at("2026-01-06T00:00:00"), [26, 1, 6, 2, 0, 0, 0]);
+        assert_eq!(at("2026-01-11T10:01:01"), [26, 1, 11, 0, 10, 1, 1]);
+        assert_eq!(at("2028-02-29T23:59:59"), [28, 2, 29, 2, 23, 59, 59]);
     }
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use busbar_profile::BitSet;
 
-use super::plant::FEEDERS;
+use super::plant::{Drive, FEEDERS};
 
 /// How long an output drives a load switch until it has moved.
 const MOVING: Duration = Duration::from_millis(400);
@@ -35,7 +35,7 @@ pub(super) struct Loads {
     confirmed: bool,
     /// The window asks whether they may.
     asks: bool,
-    /// Number of the load switch that moved last.
+    /// Number of the load switch that moves, or moved last.
     acted: u16,
     /// Number of the load switch that tripped last; 0 after a reset.
     trip_number: u16,
@@ -81,13 +81,12 @@ impl Loads {
     }
 
     fn move_switches(&mut self, dt: Duration) {
-        for (number, switch) in (1..).zip(&mut self.switches) {
+        for switch in &mut self.switches {
             let Some((closed, left)) = &mut switch.driven else { continue };
             *left = left.saturating_sub(dt);
             if left.is_zero() {
                 switch.closed = *closed;
                 switch.driven = None;
-                self.acted = number;
             }
         }
     }
@@ -102,9 +101,10 @@ impl Loads {
     }
 
     fn bring_back(&mut self) {
-        if let Some(switch) = self.switches.iter_mut().find(|switch| switch.fallen) {
+        if let Some((number, switch)) = (1..).zip(&mut self.switches).find(|(_, switch)| switch.fallen) {
             switch.fallen = false;
             switch.driven = Some((true, MOVING));
+            self.acted = number;
             self.until_next = PACE;
         }
     }
@@ -118,6 +118,9 @@ impl Loads {
         }
         switch.fallen = false;
         switch.driven = (switch.closed != close).then_some((close, MOVING));
+        if switch.driven.is_some() {
+            self.acted = index as u16 + 1;
+        }
     }
 
     /// The protection of one opens it.
@@ -154,10 +157,12 @@ impl Loads {
         self.asks
     }
 
-    /// Load switches are being brought back one after the other.
-    pub(super) fn steps_in(&self) -> bool {
-        let moving = self.switches.iter().any(|switch| switch.fallen || switch.driven.is_some());
-        moving && !self.asks && self.dead_for.is_zero()
+    /// Load switches open or close one after the other.
+    pub(super) fn steps(&self) -> Option<Drive> {
+        let driven = |close| !self.driven(close).is_empty();
+        let comes_back =
+            !self.asks && self.dead_for.is_zero() && self.switches.iter().any(|switch| switch.fallen);
+        if driven(false) { Some(Drive::Open) } else { (driven(true) || comes_back).then_some(Drive::Close) }
     }
 
     pub(super) fn acted(&self) -> u16 {
@@ -221,9 +226,9 @@ mod tests {
             run(&mut loads, 10, true, true);
             counts.push((loads.closed().len(), loads.acted()));
         }
-        assert_eq!(counts[..3], [(0, 0), (1, 1), (2, 2)]);
+        assert_eq!(counts[..3], [(0, 1), (1, 2), (2, 3)], "the number is that of the one that moves");
         assert_eq!(counts[12], (12, 12));
-        assert!(!loads.steps_in() && !loads.asks());
+        assert!(loads.steps().is_none() && !loads.asks());
     }
 
     #[test]
@@ -231,7 +236,7 @@ mod tests {
         let mut loads = Loads::new();
         run(&mut loads, 20, false, false);
         run(&mut loads, 50, true, false);
-        assert!(loads.asks() && !loads.steps_in() && loads.closed().is_empty());
+        assert!(loads.asks() && loads.steps().is_none() && loads.closed().is_empty());
         loads.answer(true);
         run(&mut loads, 200, true, false);
         assert_eq!((loads.closed().len(), loads.asks()), (12, false));
@@ -248,6 +253,7 @@ mod tests {
         let mut loads = Loads::new();
         loads.drive(4, false);
         assert_eq!(loads.driven(false).iter().collect::<Vec<_>>(), [4]);
+        assert_eq!((loads.steps(), loads.acted()), (Some(Drive::Open), 5));
         run(&mut loads, 4, true, true);
         assert_eq!((loads.closed().len(), loads.acted()), (11, 5));
         loads.trip(6);

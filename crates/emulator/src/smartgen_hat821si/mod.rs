@@ -27,6 +27,7 @@ mod genset;
 mod loads;
 mod plant;
 mod render;
+mod section;
 mod source;
 mod story;
 mod transfer;
@@ -34,6 +35,7 @@ mod transfer;
 use std::time::Duration;
 
 use busbar_modbus::ExceptionCode;
+use busbar_profile::DateTime;
 
 use crate::bank::Bank;
 use crate::panel::Panel;
@@ -81,6 +83,8 @@ const HORN: Duration = Duration::from_secs(30);
 pub(crate) struct Hat821si {
     plant: Plant,
     passed: Duration,
+    /// What the calendar said at power-on.
+    epoch: DateTime,
     supervision: [Supervision; 2],
     sequence: Sequence,
     loads: [Loads; 2],
@@ -111,8 +115,12 @@ impl Hat821si {
         let mut random = Random::new(seed ^ 0x0821_5100);
         let mut past = || Duration::from_secs(random.between(2.0e7, 9.0e7) as u64);
         let source_supply = [past(), past()];
+        let mut plant = Plant::new(seed, NORMAL);
+        for (source, time) in plant.sources.iter_mut().zip(source_supply) {
+            source.has_served(time, random.between(0.6, 0.8));
+        }
         Self {
-            plant: Plant::new(seed, NORMAL),
+            plant,
             passed: Duration::ZERO,
             supervision: [Supervision::new(), Supervision::new()],
             sequence: Sequence::new(),
@@ -132,7 +140,13 @@ impl Hat821si {
             load_supply: source_supply.map(|own| SupplyTime::new(own, &mut random)),
             story,
             scene: Scene::NOTHING,
+            epoch: DateTime::FIRST,
         }
+    }
+
+    /// The same controller with its calendar set.
+    pub(crate) fn starting(self, epoch: DateTime) -> Self {
+        Self { epoch, ..self }
     }
 
     fn available(&self) -> [bool; 2] {

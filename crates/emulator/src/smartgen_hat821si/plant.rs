@@ -1,12 +1,16 @@
 //! The switchgear: two 10 kV sources, three switches between two bus sections, and what the sections feed.
 //!
-//! QS1 puts source 1 on section 1, QS2 source 2 on section 2, QTIE joins the sections. Behind source 2 stands a
-//! genset that takes over its terminals while its mains are dead.
+//! QS1 puts source 1 on section 1, QS2 source 2 on section 2, QTIE joins the sections. Both sources come from one grid,
+//! so that they keep their angle to each other. Behind source 2 stands a genset that takes over its terminals while its
+//! mains are dead.
 
 use std::f64::consts::TAU;
+use std::time::Duration;
 
 use crate::plant::{Energy, Feed};
 use crate::random::{Drift, Random, approach};
+
+use super::section::{Demand, Section};
 
 /// Load switches of a section.
 pub(super) const FEEDERS: usize = 12;
@@ -88,6 +92,7 @@ pub(super) struct Plant {
     /// QS1, QTIE and QS2.
     pub(super) switches: [Mechanism; 3],
     sections: [Section; 2],
+    grid: Grid,
     random: Random,
 }
 
@@ -106,6 +111,7 @@ impl Plant {
                 mechanism(Switch::Qs2, second),
             ],
             sections: [Section::new(&mut random), Section::new(&mut random)],
+            grid: Grid::new(&mut random),
             random,
         };
         // One step fills the meters, so that the first image is a whole one.
@@ -143,8 +149,9 @@ impl Plant {
 
     /// Lets `dt` seconds of electricity flow into the load switches that are closed.
     pub(super) fn carry(&mut self, dt: f64, closed: [[bool; FEEDERS]; 2], genset: bool) {
+        self.grid.step(dt, &mut self.random);
         for (index, source) in self.sources.iter_mut().enumerate() {
-            source.step(dt, genset && index == 1, &mut self.random);
+            source.step(dt, genset && index == 1, &self.grid, &mut self.random);
         }
         let demands: [Demand; 2] =
             std::array::from_fn(|index| self.sections[index].step(dt, &closed[index], &mut self.random));
@@ -187,6 +194,36 @@ impl Mechanism {
     }
 }
 
+/// What both mains hang on.
+#[derive(Clone, Debug)]
+struct Grid {
+    /// Hz.
+    frequency: f64,
+    /// Degrees against a clock of exactly 50 Hz.
+    angle: f64,
+    drift: Drift,
+}
+
+impl Grid {
+    fn new(random: &mut Random) -> Self {
+        Self {
+            frequency: RATED_FREQUENCY,
+            angle: random.between(0.0, 360.0),
+            drift: Drift::new(0.012, 8.0, random),
+        }
+    }
+
+    fn step(&mut self, dt: f64, random: &mut Random) {
+        self.frequency = RATED_FREQUENCY + self.drift.step(dt, random);
+        self.angle = turned(self.angle, self.frequency, dt);
+    }
+}
+
+/// Where an angle against a clock of exactly 50 Hz stands after `dt` seconds of another frequency.
+fn turned(angle: f64, frequency: f64, dt: f64) -> f64 {
+    (angle + 360.0 * (frequency - RATED_FREQUENCY) * dt).rem_euclid(360.0)
+}
+
 /// One source as its voltage and current transformers see it.
 #[derive(Clone, Debug)]
 pub(super) struct Source {
@@ -197,24 +234,35 @@ pub(super) struct Source {
     pub(super) trouble: Trouble,
     level: Drift,
     phases: [Drift; 3],
-    frequency: Drift,
+    /// Degrees that its feeder leads the grid.
+    lead: f64,
+    swing: Drift,
+    governor: Drift,
     /// Part of its voltage that each phase has now.
     parts: [f64; 3],
 }
 
 impl Source {
     fn new(random: &mut Random) -> Self {
-        let active = random.between(2.0e6, 9.0e6);
         Self {
             feed: Feed::default(),
-            angle: random.between(0.0, 360.0),
-            energy: Energy { active, inductive: active * 0.41, ..Energy::default() },
+            angle: 0.0,
+            energy: Energy::default(),
             trouble: Trouble::Nothing,
             level: Drift::new(25.0, 180.0, random),
             phases: std::array::from_fn(|_| Drift::new(9.0, 15.0, random)),
-            frequency: Drift::new(0.012, 8.0, random),
+            lead: random.between(-6.0, 6.0),
+            swing: Drift::new(0.4, 30.0, random),
+            governor: Drift::new(0.03, 4.0, random),
             parts: [1.0; 3],
         }
+    }
+
+    /// Counts what it has delivered in its time: on the average less than it carries now.
+    pub(super) fn has_served(&mut self, time: Duration, part: f64) {
+        let hours = part * time.as_secs_f64() / 3600.0;
+        self.energy.active = hours * self.feed.total_active();
+        self.energy.inductive = hours * self.feed.total_reactive();
     }
 
     /// Whether any phase has a voltage that a frequency and an angle can be measured from.
@@ -232,10 +280,13 @@ impl Source {
         [0.0, 240.0, 120.0].map(|behind| (self.angle + behind).rem_euclid(360.0))
     }
 
-    /// Degrees of each phase's current, 0 to 360.
+    /// Degrees of each phase's current, 0 to 360; 0 where none flows.
     pub(super) fn current_angles(&self) -> [f64; 3] {
         let angles = self.angles();
         std::array::from_fn(|phase| {
+            if self.feed.active[phase] == 0.0 {
+                return 0.0;
+            }
             let lag = self.feed.reactive[phase].atan2(self.feed.active[phase]).to_degrees();
             (angles[phase] - lag).rem_euclid(360.0)
         })
@@ -255,7 +306,7 @@ impl Source {
         self.parts.iter().sum::<f64>() / 3.0
     }
 
-    fn step(&mut self, dt: f64, genset: bool, random: &mut Random) {
+    fn step(&mut self, dt: f64, genset: bool, grid: &Grid, random: &mut Random) {
         let from_genset = genset && self.trouble == Trouble::Blackout;
         let remains = if from_genset { [1.0; 3] } else { self.trouble.remains() };
         for (part, target) in self.parts.iter_mut().zip(remains) {
@@ -271,11 +322,18 @@ impl Source {
         for (phase, part) in self.parts.into_iter().enumerate() {
             self.feed.voltage[phase] = part * (level + self.phases[phase].step(dt, random));
         }
-        // A genset gives way under load, the grid does not.
-        let droop = if from_genset { 0.25 - 0.0002 * self.feed.total_active() } else { 0.0 };
-        let frequency = RATED_FREQUENCY + self.frequency.step(dt, random) + droop;
+        let (swing, governor) = (self.swing.step(dt, random), self.governor.step(dt, random));
+        let frequency = if from_genset {
+            // A genset gives way under load, the grid does not.
+            let frequency = RATED_FREQUENCY + 0.25 - 0.0002 * self.feed.total_active() + governor;
+            self.angle = turned(self.angle, frequency, dt);
+            frequency
+        } else {
+            self.angle = (grid.angle + self.lead + swing).rem_euclid(360.0);
+            // What one meter differs from the other.
+            grid.frequency + 0.1 * governor
+        };
         self.feed.frequency = if self.is_present() { frequency } else { 0.0 };
-        self.angle = (self.angle + 360.0 * (frequency - RATED_FREQUENCY) * dt).rem_euclid(360.0);
     }
 
     /// Takes the sections that it feeds. Whole kW and kvar: totals are then the exact sums of what is shown.
@@ -289,50 +347,6 @@ impl Source {
             }
         }
         self.energy.add(&self.feed, dt);
-    }
-}
-
-/// kW and kvar of each phase that a section takes at full voltage.
-#[derive(Clone, Copy, Debug)]
-struct Demand {
-    active: [f64; 3],
-    reactive: [f64; 3],
-}
-
-/// What hangs on one bus section.
-#[derive(Clone, Debug)]
-struct Section {
-    /// kW of each load switch.
-    feeders: [f64; FEEDERS],
-    level: Drift,
-    power_factor: Drift,
-    shares: [Drift; 3],
-}
-
-impl Section {
-    fn new(random: &mut Random) -> Self {
-        Self {
-            feeders: std::array::from_fn(|_| random.between(110.0, 260.0)),
-            level: Drift::new(0.03, 60.0, random),
-            power_factor: Drift::new(0.008, 60.0, random),
-            shares: std::array::from_fn(|_| Drift::new(0.004, 45.0, random)),
-        }
-    }
-
-    fn step(&mut self, dt: f64, closed: &[bool; FEEDERS], random: &mut Random) -> Demand {
-        let level = 1.0 + self.level.step(dt, random);
-        let power_factor = 0.92 + self.power_factor.step(dt, random);
-        let reactive_part = (1.0 - power_factor * power_factor).sqrt() / power_factor;
-        let connected = self.feeders.iter().zip(closed).filter(|(_, closed)| **closed);
-        let total = level * connected.map(|(kw, _)| kw).sum::<f64>();
-
-        let mut shares = [0.337, 0.333, 0.330];
-        for (share, drift) in shares.iter_mut().zip(&mut self.shares) {
-            *share += drift.step(dt, random);
-        }
-        let whole: f64 = shares.iter().sum();
-        let active = shares.map(|share| total * share / whole);
-        Demand { active, reactive: active.map(|kw| kw * reactive_part) }
     }
 }
 
@@ -395,6 +409,36 @@ mod tests {
         assert_eq!(plant.alive(), [true, true]);
         assert!(!plant.sources[0].is_present());
         assert!((49.0..49.9).contains(&plant.sources[1].feed.frequency), "{:?}", plant.sources[1].feed);
+    }
+
+    #[test]
+    fn sources_of_one_grid_keep_their_angle_and_the_genset_does_not() {
+        let between = |plant: &Plant| {
+            let [first, second] = plant.sources.each_ref().map(|source| source.angles()[0]);
+            (first - second + 180.0).rem_euclid(360.0) - 180.0
+        };
+        let mut plant = Plant::new(5, Positions::of(1, 0, 1));
+        for _ in 0..600 {
+            carry(&mut plant, 1.0, false);
+            assert!(between(&plant).abs() < 15.0, "{}", between(&plant));
+            let [first, second] = plant.sources.each_ref().map(|source| source.feed.frequency);
+            assert!((first - second).abs() < 0.02 && (first - 50.0).abs() < 0.1, "{first} {second}");
+        }
+        plant.sources[1].trouble = Trouble::Blackout;
+        let mut farthest = 0.0_f64;
+        for _ in 0..60 {
+            carry(&mut plant, 1.0, true);
+            farthest = farthest.max(between(&plant).abs());
+        }
+        assert!(farthest > 90.0, "{farthest}");
+    }
+
+    #[test]
+    fn what_was_delivered_fits_the_time() {
+        let mut source = Plant::new(4, Positions::of(1, 0, 1)).sources[0].clone();
+        source.has_served(Duration::from_secs(3600 * 100), 0.5);
+        assert!((source.energy.active - 50.0 * source.feed.total_active()).abs() < 1e-6);
+        assert!(source.energy.inductive < source.energy.active);
     }
 
     #[test]

@@ -117,13 +117,11 @@ fn source(source: &Source, at: &SourceRegisters, bank: &mut Bank) {
     bank.number(at.frequency, feed.frequency);
     bank.number(at.unbalance, 1000.0 * unbalance(feed.line_voltage()));
 
-    let flowing = feed.total_active() > 0.0;
     let (residual, residual_angle) = source.residual();
     bank.numbers(at.current, 1, feed.current());
     bank.number(at.neutral_current, residual);
-    let angles = if flowing { source.current_angles() } else { [0.0; 3] };
-    bank.numbers(at.current_angle, 1, angles.map(|degrees| 10.0 * degrees));
-    bank.number(at.neutral_angle, if flowing { 10.0 * residual_angle } else { 0.0 });
+    bank.numbers(at.current_angle, 1, source.current_angles().map(|degrees| 10.0 * degrees));
+    bank.number(at.neutral_angle, 10.0 * residual_angle);
     bank.numbers(at.active, 2, feed.active);
     bank.number(at.total_active, feed.total_active());
     bank.numbers(at.reactive, 2, feed.reactive);
@@ -173,10 +171,12 @@ fn state(unit: &Hat821si, bank: &mut Bank) {
     bank.integer(1093, unit.genset.seconds_left() as i64);
 
     let positions = unit.plant.positions();
-    let steps = unit.loads.each_ref().map(Loads::steps_in);
+    let steps = unit.loads.each_ref().map(Loads::steps);
     let status = match (unit.sequence.is_still(), steps) {
-        (true, [true, _]) => 26,
-        (true, [false, true]) => 28,
+        (true, [Some(Drive::Close), _]) => 26,
+        (true, [Some(Drive::Open), _]) => 27,
+        (true, [None, Some(Drive::Close)]) => 28,
+        (true, [None, Some(Drive::Open)]) => 29,
         _ => unit.sequence.status(positions),
     };
     bank.code(1094, status);
@@ -267,7 +267,7 @@ fn inputs_and_outputs(unit: &Hat821si, bank: &mut Bank) {
 }
 
 fn counters(unit: &Hat821si, bank: &mut Bank) {
-    for (address, part) in (1100..).zip(calendar(unit.passed)) {
+    for (address, part) in (1100..).zip(calendar(unit.epoch.plus(unit.passed))) {
         bank.integer(address, part);
     }
     let [load_1, load_2] = &unit.load_supply;

@@ -233,9 +233,9 @@ fn interrupted_never(site: &mut Site, status: u32) -> Vec<u32> {
 #[test]
 fn the_clock_runs_and_is_set_register_by_register() {
     let mut site = quiet();
-    assert_eq!(clock(&site), [26, 1, 1, 10, 0, 0]);
+    assert_eq!(clock(&site), [26, 1, 5, 10, 0, 0]);
     site.pass_seconds(61);
-    assert_eq!(clock(&site), [26, 1, 1, 10, 1, 1]);
+    assert_eq!(clock(&site), [26, 1, 5, 10, 1, 1]);
 
     for (register, value) in (CLOCK..).zip([27, 2, 28, 23, 59, 58]) {
         site.write(register, value);
@@ -243,6 +243,23 @@ fn the_clock_runs_and_is_set_register_by_register() {
     }
     site.pass_seconds(2);
     assert_eq!(clock(&site), [27, 3, 1, 0, 0, 0]);
+}
+
+#[test]
+fn the_clock_starts_where_it_is_told_and_nothing_else_follows_it() {
+    let epoch = "2031-12-31T23:59:50".parse().unwrap();
+    let mut site = Site::new(&Config { epoch, ..config() });
+    let mut usual = quiet();
+    assert_eq!(clock(&site), [31, 12, 31, 23, 59, 50]);
+    for site in [&mut site, &mut usual] {
+        site.pass_seconds(20);
+    }
+    assert_eq!(clock(&site), [32, 1, 1, 0, 0, 10]);
+    let without_clock = |site: &Site| {
+        let points = site.device.profile().points.iter().filter(|point| !point.id.starts_with("clock_"));
+        points.map(|point| format!("{} {:?}", point.id, site.decode(&point.id))).collect::<Vec<_>>()
+    };
+    assert_eq!(without_clock(&site), without_clock(&usual));
 }
 
 #[test]

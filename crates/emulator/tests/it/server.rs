@@ -137,6 +137,29 @@ async fn function_0_is_an_illegal_function_and_functions_above_127_are_none() {
     assert_eq!((statistics.requests, statistics.answers, statistics.garbage), (4, 3, 2));
 }
 
+/// The function is judged before what follows it; a body that does not fit a function of the unit has no exception.
+#[tokio::test]
+async fn a_function_that_the_unit_does_not_have_is_refused_whatever_its_body() {
+    let emulation = start(loopback(&[0])).await.unwrap();
+    let mut stream = connect(&emulation).await;
+    for function in [1, 2, 4, 5, 15, 0x2B] {
+        for body in [&[][..], &[0], &[0, 0, 0, 1, 0], &[0; 250]] {
+            let length = body.len() as u8 + 2;
+            stream.write_all(&[&[0, 1, 0, 0, 0, length, 1, function], body].concat()).await.unwrap();
+            let refused = [0, 1, 0, 0, 0, 3, 1, function | 0x80, 1];
+            assert_eq!(receive(&mut stream, 9).await, refused, "{body:02X?}");
+        }
+    }
+    let before = emulation.statistics();
+    for function in [3, 6, 16] {
+        stream.write_all(&[0, 2, 0, 0, 0, 3, 1, function, 0]).await.unwrap();
+    }
+    stream.write_all(&read_frame(3, 1, 10609, 1)).await.unwrap();
+    assert_eq!(receive(&mut stream, 11).await[..2], [0, 3]);
+    let after = emulation.statistics();
+    assert_eq!((after.answers - before.answers, after.garbage - before.garbage), (1, 3));
+}
+
 #[tokio::test]
 async fn a_hard_reset_answers_drops_everybody_and_comes_back() {
     // 4 simulated seconds of silence are 40 ms.

@@ -130,12 +130,15 @@ pub struct StateView {
 /// The mode a device is in.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ModeView {
-    /// The code in the register, or the number of the bit where each mode has a bit of its own.
+    /// The code in the register, or the number of the bit that tells the mode.
     #[schema(examples(4))]
     pub code: u32,
     /// The maker's name of that mode.
     #[schema(examples("AUTO"))]
     pub label: String,
+    /// The shared word of the vocabulary: `off`, `manual`, `auto` and so on; null where there is none.
+    #[schema(required, examples("auto"))]
+    pub canonical: Option<String>,
 }
 
 /// Active alarms, counted by class.

@@ -62,8 +62,23 @@ fn a_mode_may_be_a_bit_of_its_own() {
     };
     let auto = read(1 << 4).unwrap();
     assert_eq!((auto.code, auto.label.as_str()), (4, mode.bit_label(4).as_ref()));
+    assert_eq!(auto.canonical.as_deref(), Some("auto"));
     assert_eq!(read(1 << 5).unwrap().code, 5);
     assert_eq!(read(0), None);
+}
+
+#[test]
+fn a_clear_bit_may_be_a_mode() {
+    let profile = busbar_profile::builtin("smartgen-hat821si").unwrap();
+    let mut device = Device::new(SiteDevice { profile, ..site_device("hat") }, "w1".to_owned());
+    for (word, label, canonical) in
+        [(1 << 8, "Auto mode", "auto"), (0, "Manual mode", "manual"), (!(1 << 8), "Manual mode", "manual")]
+    {
+        device.finish(answered(Rate::Fast, &[(500, &[word])]), at(0), ts(0));
+        let mode = device.view().mode.unwrap();
+        assert_eq!((mode.code, mode.label.as_str()), (8, label), "{word:04X}h");
+        assert_eq!(mode.canonical.as_deref(), Some(canonical), "{word:04X}h");
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 // A failed expectation may panic in a test's helpers as it may in the test.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod bad_line;
 mod events;
 mod faults;
 mod http;

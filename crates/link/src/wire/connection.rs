@@ -33,6 +33,9 @@ impl Wire {
         self.connections += 1;
         self.connected_at = now;
         self.answers = 0;
+        self.disturbed = None;
+        // Nobody has listened yet: on a line somebody may be speaking.
+        self.earliest = self.earliest.max(now + self.line.silence);
         // Behind a new connection things may have changed.
         self.units.iter_mut().for_each(|unit| unit.next_probe = Duration::ZERO);
         self.enter(Phase::Connected);

@@ -16,7 +16,7 @@ use crate::queue::Place;
 /// For so many times the longest time-out after that is over, a request on RTU may still be answered.
 const HORIZON: u32 = 2;
 
-/// An answer has at least so many bytes on RTU. Fewer that make no sense are noise, and the answer may still come.
+/// An answer has at least so many bytes on RTU. Fewer are noise, and the answer may still come.
 const LEAST_ANSWER: u64 = 5;
 
 /// The one request that is on the wire.
@@ -39,8 +39,9 @@ pub(super) struct Exchange {
     limit: Duration,
     spacing: Duration,
     started: Duration,
-    pub(super) ear: Ear,
     deadline: Duration,
+    /// What is heard instead of an answer.
+    pub(super) ear: Ear,
     /// When silence will have ended what has come so far, if that does not look like the answer.
     silence: Option<Duration>,
 }
@@ -48,6 +49,11 @@ pub(super) struct Exchange {
 impl Exchange {
     pub(super) fn unit(&self) -> u8 {
         self.question.unit
+    }
+
+    /// When what came is looked at again, if not only at the deadline.
+    pub(super) fn next_look(&self) -> Option<Duration> {
+        self.silence
     }
 
     /// Until when its answer may come.
@@ -88,12 +94,14 @@ impl Wire {
             return Err(LinkError::Closed);
         };
         let limit = job.timeout;
+        let poll = job.priority == Priority::Poll;
         let floor = self.rules.timeout_floor;
         let timeout = match self.units.get(job.unit) {
-            _ if question.write => limit,
+            // Nothing is given up before one try has waited as long as the caller would.
+            _ if question.write || entry.tries > 0 => limit,
             None => limit,
             // A probe is no reason to make the others wait long. Who turns out to be slower is heard late.
-            Some(unit) if has_slots && unit.is_silent() => {
+            Some(unit) if poll && has_slots && unit.is_silent() => {
                 let own = unit.timing.probe(floor, limit);
                 own.or_else(|| self.units.slowest(floor, limit)).unwrap_or(limit)
             }
@@ -114,7 +122,7 @@ impl Wire {
         self.exchange = Some(Exchange {
             place,
             question,
-            poll: job.priority == Priority::Poll,
+            poll,
             tries: entry.tries,
             sent: Sent::Whole,
             in_step: true,
@@ -124,8 +132,8 @@ impl Wire {
             limit,
             spacing: job.spacing,
             started: now,
-            ear: Ear::new(self.client.counters()),
             deadline: now + patience,
+            ear: Ear::new(self.client.counters()),
             silence: None,
         });
         Ok(now + patience)
@@ -155,7 +163,7 @@ impl Wire {
     pub(super) fn hear(&mut self, now: Duration, bytes: &[u8]) {
         let len = bytes.len() as u64;
         if self.line.is_rtu() && len > 0 {
-            self.earliest = self.earliest.max(now + self.line.silence);
+            self.break_silence(now);
         }
         let Some(exchange) = &mut self.exchange else {
             self.unasked_bytes += len;
@@ -241,7 +249,7 @@ impl Wire {
             if is_doubtful {
                 self.doubt(now, &exchange);
             }
-            if !(is_doubtful && self.retry(&exchange)) {
+            if !(is_doubtful && self.retry(now, &exchange)) {
                 self.queue.finish(exchange.place, Err(error), wakes);
             }
         } else {
@@ -277,13 +285,14 @@ impl Wire {
             return self.hang_up(now, Cause::Stuck, wakes);
         }
         let Some(exchange) = self.end(now) else { return };
-        // What came garbled was the answer, unless somebody else's was still due.
-        let is_spent = exchange.garbage >= LEAST_ANSWER && !self.doubts.is_any(now);
+        // What began as the answer and came garbled was the answer, unless somebody else's was still due.
+        let is_garbled = exchange.in_step && exchange.garbage >= LEAST_ANSWER;
+        let is_spent = is_garbled && !self.doubts.is_any(now);
         if self.line.is_rtu() && !is_spent {
             self.doubt(now, &exchange);
         }
-        let heard = exchange.ear.judge(self.line.is_rtu(), self.client.counters());
         let Exchange { place, timeout: after, tries, .. } = exchange;
+        let heard = exchange.ear.judge(self.line.is_rtu(), self.client.counters());
         let unit = exchange.unit();
         let was_silent = tries == 1 && self.silence.is_silent(unit);
         self.silence.timed_out(unit);
@@ -297,9 +306,9 @@ impl Wire {
         // Who was silent before gets one try while others answer.
         let again = !was_silent || dead || !self.has_slots();
         if exchange.question.write {
-            let loss = Loss::TimedOut { after };
+            let loss = Loss::TimedOut { after, heard };
             self.queue.finish(place, Err(LinkError::Lost { unit, loss }), wakes);
-        } else if !again || !self.retry(&exchange) {
+        } else if !again || !self.retry(now, &exchange) {
             self.queue.finish(place, Err(LinkError::Timeout { unit, after, tries, heard }), wakes);
         }
         if dead {
@@ -351,21 +360,23 @@ impl Wire {
             true => LinkError::Lost { unit, loss: Loss::Dropped(reason) },
             false => LinkError::Down { reason },
         };
-        if !self.retry(exchange) {
+        if !self.retry(now, exchange) {
             self.queue.finish(exchange.place, Err(error), wakes);
         }
     }
 
     /// Puts a read back behind the others of its class if it may be sent once more. The one place where
     /// anything is sent again, and no write gets past its first line.
-    fn retry(&mut self, exchange: &Exchange) -> bool {
+    fn retry(&mut self, now: Duration, exchange: &Exchange) -> bool {
         if exchange.question.write || exchange.tries > self.rules.retries {
             return false;
         }
+        let modest_until =
+            exchange.poll.then(|| self.modest_until(now, exchange.unit(), exchange.limit)).flatten();
         let Some(entry) = self.queue.entry(exchange.place) else {
             return false;
         };
-        entry.probe = exchange.poll && !self.silence.is_answering(exchange.unit());
+        entry.modest_until = modest_until;
         self.queue.put_back(exchange.place);
         true
     }

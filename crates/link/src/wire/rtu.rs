@@ -2,7 +2,6 @@
 
 use super::script::*;
 use super::*;
-use crate::endpoint::Serial;
 use crate::job::Ask;
 
 /// Nanoseconds of one character and of 3.5 at 9600 baud, 8N1.
@@ -104,8 +103,7 @@ fn drains_the_line_after_a_time_out() {
 /// A line on which unit 1 was asked for address 100 in vain, with nothing heard, and other questions wait. Gives back
 /// the time at which the line is drained.
 fn in_doubt(questions: &[(u8, Ask)]) -> (Script, u64) {
-    let mut script = Script::on(Line::rtu(&Serial::default()), Options { retries: 0, ..Options::default() });
-    script.connect(0);
+    let mut script = Script::serial_with(Options { retries: 0, ..Options::default() });
     script.submit(0, Priority::Person, read(100)).unwrap();
     script.asks(0);
     assert_eq!(script.step(1018), Step::Wait(None));
@@ -165,9 +163,7 @@ fn a_garbled_answer_is_spent() {
     let mut garbled = rtu_answer(1, 7);
     garbled[4] ^= 0x10;
     for (bytes, held) in [(&garbled[..], false), (&[0x55, 0xAA], true)] {
-        let mut script =
-            Script::on(Line::rtu(&Serial::default()), Options { retries: 0, ..Options::default() });
-        script.connect(0);
+        let mut script = Script::serial_with(Options { retries: 0, ..Options::default() });
         script.read(0);
         script.asks(0);
         script.hears(30, bytes);

@@ -54,10 +54,15 @@ impl Script {
         self.wire.connected(ms(at));
     }
 
-    /// A serial line of 9600 baud, 8N1: 1.041667 ms a character, 3.645834 ms of silence.
+    /// A serial line of 9600 baud, 8N1: 1.041667 ms a character, 3.645834 ms of silence. It has been silent already.
     pub(super) fn serial() -> Self {
-        let mut script = Self::on(Line::rtu(&Serial::default()), Options::default());
+        Self::serial_with(Options::default())
+    }
+
+    pub(super) fn serial_with(options: Options) -> Self {
+        let mut script = Self::on(Line::rtu(&Serial::default()), options);
         script.connect(0);
+        script.wire.earliest = Duration::ZERO;
         script
     }
 

@@ -151,7 +151,7 @@ fn never_sends_a_write_twice() {
     assert_eq!(script.step(1000), Step::Wait(None));
     assert_eq!(
         script.outcome(&ticket),
-        Some(Err(LinkError::Lost { unit: 1, loss: Loss::TimedOut { after: ms(TIMEOUT) } }))
+        Some(Err(LinkError::Lost { unit: 1, loss: Loss::TimedOut { after: ms(TIMEOUT), heard: NOTHING } }))
     );
 
     // Its late echo does not confirm the next write, which carries the same bytes.

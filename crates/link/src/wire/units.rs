@@ -153,13 +153,14 @@ fn a_silent_unit_is_polled_in_slots_that_grow() {
     // A person has not to wait, and moves no slot; an answer ends it.
     let error = poll(&mut script, now, 2);
     script.submit_to(now, 2, Priority::Person, read(1)).unwrap();
-    assert_eq!(script.asks(now).2, ms(200));
-    script.step(now + 200);
-    assert_ne!(poll(&mut script, now + 200, 2).unwrap_err(), error.unwrap_err(), "only time has passed");
-    script.submit_to(now + 200, 2, Priority::Command, read(1)).unwrap();
-    serve(&mut script, now + 200);
-    poll(&mut script, now + 201, 2).unwrap();
-    serve(&mut script, now + 201);
+    assert_eq!(script.asks(now).2, ms(1000), "and does not wait for less than he would for any other");
+    now += 1000;
+    script.step(now);
+    assert_ne!(poll(&mut script, now, 2).unwrap_err(), error.unwrap_err(), "only time has passed");
+    script.submit_to(now, 2, Priority::Command, read(1)).unwrap();
+    serve(&mut script, now);
+    poll(&mut script, now + 1, 2).unwrap();
+    serve(&mut script, now + 1);
 }
 
 #[test]
@@ -181,6 +182,64 @@ fn a_late_answer_ends_the_silence_and_the_haste() {
     script.hears(4300, &answer_of(2, transaction));
     poll(&mut script, 4300, 2).unwrap();
     assert_eq!(script.asks(4300).2, ms(900), "it took 300 ms");
+}
+
+#[test]
+fn a_unit_that_is_slow_at_times_is_not_given_up_early() {
+    let mut script = Script::on(Line::tcp(), Options::default());
+    script.connect(0);
+    for round in 0..20 {
+        poll(&mut script, 1000 * round, 1).unwrap();
+        script.asks(1000 * round);
+        script.hears(1000 * round + 50, &answer(u16::try_from(round + 1).unwrap()));
+    }
+    // From 50 ms to 900 ms: within the time-out that the caller gave.
+    let mut now = 20_000;
+    let ticket = poll(&mut script, now, 1).unwrap();
+    assert_eq!(script.asks(now).2, ms(200), "it is asked again soon");
+    now += 200;
+    assert_eq!(script.asks(now).2, ms(1000), "and then waited for");
+    script.hears(now + 700, &answer(21));
+    script.hears(now + 900, &answer(22));
+    assert_eq!(script.outcome(&ticket), Some(Ok(vec![0x08FE, 0])));
+    assert_eq!(script.statistics().late, 1);
+}
+
+#[test]
+fn one_lost_answer_does_not_put_a_unit_behind_all_others() {
+    // Unit 1 has always something to be asked; unit 2 loses one answer.
+    let mut script = Script::connected();
+    for unit in [1, 2] {
+        poll(&mut script, 0, unit).unwrap();
+        serve(&mut script, 0);
+    }
+    poll(&mut script, 0, 2).unwrap();
+    assert_eq!(script.asks(0).0, 2);
+    for _ in 0..8 {
+        poll(&mut script, 0, 1).unwrap();
+    }
+    script.step(1000);
+    let transaction = u16::from_be_bytes([script.out[0], script.out[1]]);
+    script.hears(1000, &answer(transaction));
+    assert_eq!(serve(&mut script, 1000).0, 2, "it is tried again in its turn");
+}
+
+#[test]
+fn a_new_unit_does_not_wait_long_on_a_busy_wire() {
+    let mut script = Script::connected();
+    poll(&mut script, 0, 1).unwrap();
+    serve(&mut script, 0);
+    let mut asked_at = None;
+    for now in (0..20_000).step_by(100) {
+        poll(&mut script, now, 1).unwrap();
+        if now == 0 {
+            poll(&mut script, now, 2).unwrap();
+        }
+        if serve(&mut script, now).0 == 2 {
+            asked_at.get_or_insert(now);
+        }
+    }
+    assert_eq!(asked_at, Some(3000));
 }
 
 #[test]

@@ -87,7 +87,7 @@ async fn a_converter_takes_frames_of_the_line() {
         stream.read_exact(&mut request).await.unwrap();
         stream
     });
-    let link = Link::open(endpoint, quick()).unwrap();
+    let link = open(endpoint, quick()).await;
     assert_eq!(read(&link).await, Ok(vec![2302]));
     assert_eq!(read(&link.with_timeout(Duration::from_secs(30))).await, Ok(vec![2303]));
     assert_eq!(link.statistics().echoes, 1);
@@ -119,10 +119,41 @@ async fn an_adapter_may_echo() {
     assert_eq!(read(&link).await, Ok(vec![7]));
     assert_eq!(link.write(UNIT, set(4)).await, Ok(()));
     let unanswered = link.with_timeout(QUICK).write(UNIT, set(5)).await.unwrap_err();
-    assert!(matches!(unanswered, LinkError::Lost { loss: Loss::TimedOut { .. }, .. }), "{unanswered}");
+    assert!(
+        matches!(unanswered, LinkError::Lost { loss: Loss::TimedOut { heard: Heard::Echo, .. }, .. }),
+        "{unanswered}"
+    );
     assert_eq!(read(&link).await, Ok(vec![8]));
     let seen = link.statistics();
     assert_eq!((seen.echoes, seen.garbage_bytes, seen.late), (4, 0, 0));
+    slave.join().unwrap();
+}
+
+#[tokio::test]
+async fn an_echo_behind_noise_confirms_no_write() {
+    let line = Line::new();
+    let endpoint = line.endpoint();
+    let slave = line.play(|line| {
+        // The transceiver adds a byte whenever it switches over.
+        let request = line.request();
+        line.say(&[&[0xFF], &request[..], &register(&request, 7)].concat());
+        let write = line.request();
+        line.say(&[&[0xFF], &write[..]].concat());
+        let write = line.request();
+        line.say(&[&[0xFF], &write[..5]].concat());
+        line.say(&[&write[5..], &write].concat());
+        // An echo alone is no answer, but a refusal behind it is.
+        let write = line.request();
+        line.say(&[&write[..], &frame(&[write[0], write[1] | 0x80, 10])].concat());
+    });
+    let link = Link::open(endpoint, options()).unwrap();
+    assert_eq!(read(&link).await, Ok(vec![7]));
+    let unanswered = link.with_timeout(QUICK).write(UNIT, set(4)).await;
+    assert!(matches!(unanswered, Err(LinkError::Lost { loss: Loss::TimedOut { .. }, .. })), "{unanswered:?}");
+    assert_eq!(link.write(UNIT, set(5)).await, Ok(()));
+    let refused = link.write(UNIT, set(6)).await;
+    assert!(matches!(refused, Err(LinkError::Exception { .. })), "{refused:?}");
+    assert_eq!(link.statistics().echoes, 4);
     slave.join().unwrap();
 }
 
@@ -134,7 +165,7 @@ async fn an_echo_alone_is_named() {
         let request = line.request();
         line.say(&request);
     });
-    let link = Link::open(endpoint, quick()).unwrap();
+    let link = open(endpoint, quick()).await;
     let silent = read(&link).await.unwrap_err();
     assert!(matches!(silent, LinkError::Timeout { heard: Heard::Echo, .. }), "{silent}");
     assert!(silent.to_string().contains("the adapter echoes"), "{silent}");

@@ -1,6 +1,8 @@
 //! Bytes that are no answer: noise, pieces, late and foreign frames. None becomes a value, and each has its sentence.
 
-use busbar_link::{Heard, Link, LinkError};
+use std::time::Duration;
+
+use busbar_link::{Heard, Link, LinkError, Options, WireState, Write};
 
 use crate::slave::*;
 
@@ -13,7 +15,7 @@ async fn heard(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (Heard, Li
         let answer = answer(&request);
         line.say(&answer);
     });
-    let link = Link::open(endpoint, quick()).unwrap();
+    let link = open(endpoint, quick()).await;
     let error = read(&link).await.unwrap_err();
     slave.join().unwrap();
     let LinkError::Timeout { heard, .. } = error else { panic!("{error}") };
@@ -40,6 +42,70 @@ async fn noise_before_an_answer_does_not_hide_it() {
     }
     let seen = link.statistics();
     assert_eq!((seen.late, seen.garbage_bytes), (1, 3));
+    slave.join().unwrap();
+}
+
+#[tokio::test]
+async fn an_answer_behind_noise_does_not_wait_for_the_deadline() {
+    let line = Line::new();
+    let endpoint = line.endpoint();
+    let slave = line.play(|line| {
+        // It looks like the beginning of a long answer.
+        let looks_long = [5, 3, 0xF0];
+        for (noise, value) in [(&looks_long[..], 7), (&[], 8), (&looks_long, 9)] {
+            let request = line.request();
+            line.say(&[noise, &register(&request, value)].concat());
+        }
+    });
+    let patient = Options { timeout_floor: options().timeout, ..options() };
+    let link = Link::open(endpoint, patient).unwrap();
+    wait_until(&link, |state| *state == WireState::Connected).await;
+    let soon = Duration::from_secs(10);
+    for value in [7, 8, 9] {
+        // Long enough for the line to be silent: the caller sends and reads by himself.
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        assert_eq!(tokio::time::timeout(soon, read(&link)).await, Ok(Ok(vec![value])));
+    }
+    slave.join().unwrap();
+}
+
+#[tokio::test]
+async fn a_line_that_is_never_silent_is_named_and_soon() {
+    let line = Line::new();
+    let endpoint = line.endpoint();
+    let (end, ended) = std::sync::mpsc::channel::<()>();
+    let slave = line.play(move |line| {
+        let chatter = Duration::from_millis(1);
+        while ended.recv_timeout(chatter) == Err(std::sync::mpsc::RecvTimeoutError::Timeout) {
+            line.say(&[0xFF; 8]);
+        }
+        // And then it is a line like others, down to the last write.
+        loop {
+            let request = line.request();
+            if request[1] == 6 {
+                line.say(&request);
+                return;
+            }
+            line.say(&register(&request, 7));
+        }
+    });
+    let link = Link::open(endpoint, quick()).unwrap();
+    wait_until(&link, |state| *state == WireState::Connected).await;
+    // On a busy machine a pause may slip in; then there is no answer.
+    let mut named = false;
+    for _ in 0..20 {
+        let error = tokio::time::timeout(Duration::from_secs(10), read(&link)).await.unwrap().unwrap_err();
+        named |= matches!(error, LinkError::NeverSilent { unit: UNIT, .. });
+        if named {
+            assert!(error.to_string().contains("not silent within 300ms; check"), "{error}");
+            break;
+        }
+    }
+    assert!(named);
+    drop(end);
+    let patient = link.with_timeout(Duration::from_secs(30));
+    assert_eq!(read(&patient).await, Ok(vec![7]));
+    assert_eq!(patient.write(UNIT, Write::Register { address: 8193, value: 4 }).await, Ok(()));
     slave.join().unwrap();
 }
 
@@ -100,7 +166,7 @@ async fn a_late_answer_is_counted_and_not_taken() {
         let (request, _) = line.hear(8);
         line.say(&register(&request, 7));
     });
-    let link = Link::open(endpoint, quick()).unwrap();
+    let link = open(endpoint, quick()).await;
     let error = read(&link).await.unwrap_err();
     assert!(matches!(error, LinkError::Timeout { .. }), "{error}");
     late.send(()).unwrap();
@@ -108,7 +174,7 @@ async fn a_late_answer_is_counted_and_not_taken() {
     while link.statistics().late == 0 {
         tokio::task::yield_now().await;
     }
-    let second = link.with_timeout(std::time::Duration::from_secs(30));
+    let second = link.with_timeout(Duration::from_secs(30));
     assert_eq!(second.read_registers(UNIT, 3, ADDRESS + 1, 1).await, Ok(vec![7]));
     slave.join().unwrap();
 }

@@ -97,6 +97,13 @@ pub(crate) fn quick() -> Options {
     Options { timeout: QUICK, retries: 0, ..options() }
 }
 
+/// A link that is up: what it is asked from now on leaves, however short its time-out.
+pub(crate) async fn open(endpoint: Endpoint, options: Options) -> Link {
+    let link = Link::open(endpoint, options).unwrap();
+    link.state().wait_for(|state| *state == WireState::Connected).await.unwrap();
+    link
+}
+
 pub(crate) fn frame(body: &[u8]) -> Vec<u8> {
     [body, &rtu::crc16(body).to_le_bytes()].concat()
 }

@@ -61,6 +61,49 @@ async fn sends_and_takes_exactly_these_bytes() {
 }
 
 #[tokio::test]
+async fn counts_each_unit_and_keeps_writes_together() {
+    let (listener, endpoint) = listener().await;
+    let peer = async move {
+        let (mut stream, _) = listener.accept().await.unwrap();
+        let mut functions = Vec::new();
+        for _ in 0..4 {
+            let request = request(&mut stream).await;
+            functions.push((request[6], request[7]));
+            let answer = match request[11] {
+                // The third write is refused.
+                3 => frame([request[0], request[1]], request[6], &[0x86, 3]),
+                _ if request[7] == 6 => request.to_vec(),
+                _ => register(&request, 7),
+            };
+            stream.write_all(&answer).await.unwrap();
+        }
+        assert_eq!(functions, [(9, 6), (9, 6), (9, 6), (1, 3)]);
+        hung_up(stream).await;
+    };
+    let client = async {
+        let link = Link::open(endpoint, patient()).unwrap().with_spacing(std::time::Duration::from_millis(1));
+        assert_eq!(link.write_together(9, Vec::new()).await, Ok(()));
+        let writes = [1, 2, 3, 4].map(|value| Write::Register { address: 8193, value });
+        let (written, read) = tokio::join!(link.write_together(9, writes.into()), read(&link));
+        let Err(interrupted) = written else { panic!("the third was refused") };
+        assert_eq!((interrupted.acknowledged, interrupted.of, read), (2, 4, Ok(vec![7])));
+        assert_eq!(
+            interrupted.to_string(),
+            "unit 9 answered function 6 with exception 3 (illegal data value) \
+             (the device had acknowledged 2 of 4 writes that belong together)"
+        );
+        let seen = link.statistics();
+        let units: Vec<_> = seen.units.iter().map(|unit| (unit.unit, unit.requests, unit.answers)).collect();
+        assert_eq!(units, [(1, 1, 1), (9, 3, 3)]);
+        assert_eq!((seen.requests, seen.units[1].exceptions[&3]), (4, 1));
+        assert!(
+            seen.busy.is_zero() && seen.waiting > std::time::Duration::ZERO && seen.open_for >= seen.waiting
+        );
+    };
+    play(peer, client).await;
+}
+
+#[tokio::test]
 async fn never_takes_a_late_answer() {
     let (listener, endpoint) = listener().await;
     let peer = async move {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
-use busbar_link::{Cause, Endpoint, Link, LinkError, Loss, OpenError, Options, WireState};
+use busbar_link::{Cause, Endpoint, Heard, Link, LinkError, Loss, OpenError, Options, WireState};
 use tokio::io::AsyncWriteExt;
 use tokio::net::{TcpListener, TcpSocket, TcpStream};
 
@@ -94,7 +94,8 @@ async fn sends_a_write_once_when_nobody_answers() {
     let client = async {
         let link = Link::open(endpoint, quick()).unwrap();
         let after = QUICK;
-        assert_eq!(write(&link).await, Err(LinkError::Lost { unit: UNIT, loss: Loss::TimedOut { after } }));
+        let loss = Loss::TimedOut { after, heard: Heard::Nothing { serial: false } };
+        assert_eq!(write(&link).await, Err(LinkError::Lost { unit: UNIT, loss }));
         assert_eq!(read(&link).await, Ok(vec![222]));
     };
     play(peer, client).await;

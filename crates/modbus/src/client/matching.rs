@@ -10,6 +10,7 @@ use crate::stream::guess_response;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Verdict {
     Answer,
+    Echo,
     Late,
     WrongUnit,
     WrongFunction,
@@ -36,6 +37,7 @@ impl Verdict {
             return Self::WrongLength;
         };
         match waiting.expected.check(&response) {
+            Ok(()) if waiting.echo && !matches!(response, Response::Exception { .. }) => Self::Echo,
             Ok(()) => Self::Answer,
             Err(Mismatch::Function { .. }) => Self::WrongFunction,
             Err(Mismatch::Length { .. }) => Self::WrongLength,
@@ -45,10 +47,10 @@ impl Verdict {
 
     /// Counts a frame that is no answer, and keeps whose it was.
     fn note(self, unit: u8, pdu: &[u8], counters: &mut Counters, strays: &mut Vec<Stray>) {
-        if self == Self::Answer {
+        self.count(counters);
+        if matches!(self, Self::Answer | Self::Echo) {
             return;
         }
-        self.count(counters);
         let function = pdu.first().copied().unwrap_or_default();
         if strays.len() < MAX_STRAYS {
             strays.push(Stray {
@@ -63,6 +65,7 @@ impl Verdict {
     fn count(self, counters: &mut Counters) {
         let counter = match self {
             Self::Answer => return,
+            Self::Echo => &mut counters.echoes,
             Self::Late => &mut counters.late,
             Self::WrongUnit => &mut counters.wrong_unit,
             Self::WrongFunction => &mut counters.wrong_function,
@@ -153,9 +156,12 @@ impl Client {
 
 /// Keeps the answer; says whether it was one.
 fn settle(verdict: Verdict, pdu: &[u8], state: &mut State, answer: &mut Vec<u8>) -> bool {
-    let State::Waiting(waiting) = *state else {
+    let State::Waiting(waiting) = state else {
         return false;
     };
+    if verdict == Verdict::Echo {
+        waiting.echo = false;
+    }
     if verdict != Verdict::Answer {
         return false;
     }

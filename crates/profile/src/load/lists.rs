@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use super::Check;
-use crate::file::{At, BitListFile, ChoiceListFile, PointFile};
-use crate::point::{Bit, Choice};
+use crate::file::{At, BitFile, BitListFile, ChoiceListFile, PointFile};
+use crate::point::{Bit, Choice, Clear};
 use crate::suggest::nearest;
 use crate::terms::SignalKind;
 use crate::value::BitSet;
@@ -88,6 +88,7 @@ impl Check<'_> {
             if let Some(signal) = &bit.signal {
                 self.signal_of_kind(signal, SignalKind::Flag, "a bit");
             }
+            self.clear(bit, list);
         }
         for range in &list.reserved {
             let (first, last) = **range;
@@ -95,6 +96,25 @@ impl Check<'_> {
             if let Some(bit) = numbers.iter().find(|bit| (first..=last).contains(*bit)) {
                 self.named_and_reserved(range, &format!("bit {bit}"));
             }
+        }
+    }
+
+    /// A clear bit tells the state only where no other bit does.
+    fn clear(&mut self, bit: &BitFile, list: &BitListFile) {
+        let Some(clear) = &bit.clear else {
+            return;
+        };
+        self.text(&clear.label, &clear.span, "label");
+        if bit.state.is_none() {
+            let help = "add the state that the set bit stands for, or remove `clear`";
+            self.note(&clear.span, "a state while it is clear, and none while it is set", help);
+        } else if bit.state.as_ref() == Some(&clear.state) {
+            let help = "correct one of the two";
+            self.note(&clear.span, "the same state while it is set and while it is clear", help);
+        }
+        if list.bits.iter().filter(|other| other.state.is_some() || other.clear.is_some()).count() > 1 {
+            let help = "remove `clear`, or the state of the other bits";
+            self.note(&clear.span, "a clear bit tells nothing where other bits have states too", help);
         }
     }
 
@@ -186,6 +206,7 @@ impl Check<'_> {
                 self.outside(&bit.span, &format!("bit {}", bit.bit), point, size);
             }
             self.state(bit.state.as_ref(), point);
+            self.state(bit.clear.as_ref().map(|clear| &clear.state), point);
             bits.push(Bit {
                 bit: bit.bit,
                 id: bit.id.clone(),
@@ -193,6 +214,10 @@ impl Check<'_> {
                 class: bit.class.or(class),
                 signal: bit.signal.as_deref().cloned(),
                 state: bit.state.as_deref().cloned(),
+                clear: bit
+                    .clear
+                    .as_ref()
+                    .map(|clear| Clear { label: clear.label.clone(), state: String::clone(&clear.state) }),
                 doubt: bit.doubt.clone(),
             });
         }

@@ -19,7 +19,7 @@ use crate::{
     failure::Failure,
     people, profiles, runtime,
     table::{Align, Cell, Table},
-    terminal, wire,
+    terminal, wall_clock, wire,
 };
 use teller::Teller;
 
@@ -90,7 +90,7 @@ pub(crate) fn run(args: &args::Order, json: bool) -> Result<(), Failure> {
 fn arguments(profile: &Profile, command: &Command, args: &args::Order) -> Result<Arguments, Failure> {
     let takes_time = command.args.iter().any(|arg| matches!(arg.values, ArgValues::Time { .. }));
     let now = Zoned::now();
-    let local = local_time(&now);
+    let local = wall_clock::local(&now);
     let Some(local) = local.or_else(|| if takes_time { None } else { DateTime::new(2000, 1, 1, 0, 0, 0) })
     else {
         return Err(Failure::Failed(format!(
@@ -102,19 +102,6 @@ fn arguments(profile: &Profile, command: &Command, args: &args::Order) -> Result
     command
         .arguments(given, local)
         .map_err(|error| Failure::Call(format!("{} of {}: {error}", command.id, profile.key)))
-}
-
-/// The local time of this machine, where it is one that a controller knows.
-fn local_time(now: &Zoned) -> Option<DateTime> {
-    let part = |part: i8| u16::try_from(part).ok();
-    DateTime::new(
-        u16::try_from(now.year()).ok()?,
-        part(now.month())?,
-        part(now.day())?,
-        part(now.hour())?,
-        part(now.minute())?,
-        part(now.second().min(59))?,
-    )
 }
 
 /// Ctrl-C: what has left cannot be taken back, and programs get a document all the same.
@@ -261,7 +248,7 @@ mod tests {
 
     #[test]
     fn the_local_time_is_that_of_the_zone() {
-        let time = |text: &str| local_time(&text.parse().unwrap()).map(|time| time.to_string());
+        let time = |text: &str| wall_clock::local(&text.parse().unwrap()).map(|time| time.to_string());
         assert_eq!(time("2026-07-01T23:30:59+03:00[Europe/Istanbul]").unwrap(), "2026-07-01T23:30:59");
         assert_eq!(time("1970-01-01T00:00:07+00:00[UTC]"), None);
     }

@@ -262,3 +262,16 @@ fn set_to_local_it_echoes_and_ignores() {
     send(&mut site, AUTO, OFF);
     assert!(!bit(&site, "common_status", 8), "remote again");
 }
+
+#[test]
+fn a_load_switch_that_opens_shows_its_number_and_its_status() {
+    for (coil, status, side, number) in [("load_1_3_open", 27, 1, 3.0), ("load_2_12_open", 29, 2, 12.0)] {
+        let mut site = quiet();
+        set(&mut site, coil);
+        site.pass(TENTH);
+        assert_eq!(site.code("ats_status"), status, "{coil}");
+        assert_eq!(site.number(&format!("load_{side}_act_number")), number, "{coil}");
+        site.pass_seconds(1);
+        assert_eq!(site.code("ats_status"), 24, "{coil}");
+    }
+}

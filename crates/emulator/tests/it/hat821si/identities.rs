@@ -219,6 +219,17 @@ fn switching_agrees(site: &Site, place: &str) {
     let carries = |source: &str| site.number(&format!("{source}_active_power")) > 0.0;
     assert!(qs1 == 1 || !carries("s1"), "{place}: power through an open QS1");
     assert!(qs2 == 1 || !carries("s2"), "{place}: power through an open QS2");
+    for (side, opening) in [(1, 27), (2, 29)] {
+        let [opened, closed] =
+            ["opening", "closing"].map(|word| site.bits(&format!("load_{side}_{word}_outputs")));
+        assert!(status != opening || !opened.is_empty(), "{place}: status {status}");
+        let acts = site.number(&format!("load_{side}_act_number"));
+        let driven: Vec<f64> = opened.iter().chain(closed.iter()).map(|bit| f64::from(bit) + 1.0).collect();
+        assert!(
+            driven.is_empty() || driven.contains(&acts),
+            "{place}: side {side} drives {driven:?}, not {acts}"
+        );
+    }
     let feedback = site.bits("aux_inputs");
     assert_eq!([0, 2, 1].map(|input| u8::from(feedback.contains(input))), [qs1, qtie, qs2], "{place}");
 }

@@ -19,6 +19,13 @@ fn power_on_finds_two_sources_on_their_own_sections() {
     for side in ["load_1_closed", "load_2_closed", "load_1_work_positions", "load_2_work_positions"] {
         assert_eq!(site.bits(side).iter().collect::<Vec<_>>(), (0..12).collect::<Vec<_>>(), "{side}");
     }
+    // What was delivered in all these hours fits what is carried now.
+    for source in ["s1", "s2"] {
+        let [energy, hours, power] = ["active_energy", "supply_hours", "active_power"]
+            .map(|part| site.number(&format!("{source}_{part}")));
+        let part = energy / hours / power;
+        assert!((0.55..0.85).contains(&part), "{source}: {energy} kWh in {hours} h, {power} kW now");
+    }
 }
 
 #[test]
@@ -81,7 +88,8 @@ fn plausible(point: &Point) -> RangeInclusive<f64> {
     match (id, point.unit.as_deref()) {
         ("voltage_difference", _) => -10_500.0..=10_500.0,
         ("frequency_difference", _) => -51.0..=51.0,
-        ("phase_difference", _) => -180.0..=180.0,
+        // Two feeders of one grid.
+        ("phase_difference", _) => -15.0..=15.0,
         ("sync_failure_delay" | "parallel_mode", _) => 0.0..=0.0,
         ("ats_transfer_alarm_delay", _) => 0.0..=5.0,
         ("clock_year", _) => 26.0..=26.0,
@@ -92,7 +100,7 @@ fn plausible(point: &Point) -> RangeInclusive<f64> {
         (_, Some("V")) => 0.0..=10_500.0,
         (_, Some("Hz")) => 0.0..=50.6,
         (_, Some("deg")) => 0.0..=360.0,
-        (_, Some("kWh" | "kvarh")) => 500_000.0..=10_000_000.0,
+        (_, Some("kWh" | "kvarh")) => 2_000_000.0..=60_000_000.0,
         (_, Some("h")) => 0.0..=30_000.0,
         (_, Some("min")) => 0.0..=59.0,
         (_, Some("s")) if ends("seconds") || ends("second") => 0.0..=59.0,
