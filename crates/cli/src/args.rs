@@ -25,7 +25,7 @@ pub(crate) struct Args {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// A whole site on this machine: an imitated controller, a gateway that polls it, the page
+    /// A whole site on this machine: every controller imitated, a gateway that polls them, the page
     Demo(Demo),
     /// The gateway on a real site
     Run(Run),

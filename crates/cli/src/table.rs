@@ -43,7 +43,21 @@ impl Cell {
         &self.text
     }
 
-    fn width(&self) -> usize {
+    /// The same behind two blanks.
+    pub(crate) fn indented(&self) -> Self {
+        Self { text: format!("  {}", self.text), look: self.look }
+    }
+
+    /// The same in at most so many columns, with a mark where it was cut.
+    pub(crate) fn shortened(self, room: usize) -> Self {
+        if self.width() <= room {
+            return self;
+        }
+        let text = self.text.chars().take(room.saturating_sub(1)).chain(['…']).collect();
+        Self { text, ..self }
+    }
+
+    pub(crate) fn width(&self) -> usize {
         self.text.chars().count()
     }
 }
@@ -64,6 +78,8 @@ enum Row {
     Cells(Vec<Cell>),
     /// A line over the rows that follow, with an empty line above it.
     Title(String),
+    /// A line of its own that no column is as wide as.
+    Line(Cell),
 }
 
 /// Rows under a head, every column as wide as its widest cell.
@@ -93,6 +109,10 @@ impl Table {
         self.rows.push(Row::Title(title.into()));
     }
 
+    pub(crate) fn across(&mut self, cell: Cell) {
+        self.rows.push(Row::Line(cell));
+    }
+
     /// The table as lines, without blanks at their ends, on a terminal of that width or none.
     pub(crate) fn render(mut self, style: Style, terminal: Option<usize>) -> String {
         let mut widths = self.widths();
@@ -108,6 +128,7 @@ impl Table {
         for row in &self.rows {
             match row {
                 Row::Cells(cells) => self.line(cells, &widths, style, &mut text),
+                Row::Line(cell) => self.line(std::slice::from_ref(cell), &[0], style, &mut text),
                 Row::Title(title) => {
                     text.push('\n');
                     text.push_str(&style.title(title));

@@ -197,14 +197,39 @@ fn the_table_is_drawn_in_its_place_and_the_terminal_left_clean() {
 #[test]
 fn a_narrow_window_loses_columns_and_a_low_one_lines() {
     let peer = counting();
-    let mut terminal = Terminal::start(&format!("watch datakom-d --from {} --every 20ms", peer.url), (36, 8));
+    let mut terminal =
+        Terminal::start(&format!("watch datakom-d --from {} --every 20ms", peer.url), (36, 10));
     terminal.wait(|seen| draws(seen) >= 3);
     assert_eq!(terminal.interrupt(), Some(0));
     let screen = terminal.screen();
-    assert_eq!(screen.len(), 8, "{screen:#?}");
-    assert!(screen[6].contains("more lines: name fewer POINTs"), "{screen:#?}");
-    assert!(screen[3].starts_with("NAME") && screen[3].contains("VALUE"), "{screen:#?}");
+    assert_eq!(screen.len(), 10, "{screen:#?}");
+    assert!(screen[8].ends_with("more lines: name fewer POINTs"), "{screen:#?}");
+    assert!(screen[5].starts_with("  VALUE") && screen[5].contains("STATE"), "{screen:#?}");
     assert!(screen.iter().all(|line| !line.contains("POINT ") && !line.contains("ADDRESS")), "{screen:#?}");
+}
+
+#[test]
+fn what_is_said_of_a_value_is_never_cut() {
+    // The first round is answered, and then nobody is there any more.
+    let count = Arc::new(AtomicU16::new(0));
+    let peer = Peer::new(move |request| match count.fetch_add(1, Ordering::SeqCst) {
+        0 | 1 => request.registers(&vec![0xFFFF; request.count.into()]),
+        _ => Vec::new(),
+    });
+    for (columns, name) in
+        [(80, "Shutdown alarms 2: engine, auxil…"), (30, "Shutdown alarms 2: engine, au…")]
+    {
+        let arguments = "smartgen-acc1700 --unit 1 --every 20ms --timeout 50ms --spacing 0";
+        let points = "shutdown_alarms_2 common_status battery_voltage";
+        let mut terminal =
+            Terminal::start(&format!("watch {arguments} --from {} {points}", peer.url), (columns, 60));
+        terminal.wait(|seen| seen.contains("stale") || seen.contains("bad"));
+        assert_eq!(terminal.interrupt(), Some(0));
+        let screen = terminal.screen();
+        let states = screen.iter().filter(|line| line.contains("stale") || line.contains("bad")).count();
+        assert_eq!(states, 3, "{screen:#?}");
+        assert!(screen.iter().any(|line| line.starts_with(name)), "{screen:#?}");
+    }
 }
 
 #[test]

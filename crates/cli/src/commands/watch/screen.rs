@@ -2,7 +2,8 @@
 //!
 //! The cursor goes back up to the first line and every line is written over. Nothing else is asked of the terminal, so
 //! that there is nothing to put back at the end: the last table stays, as any other output does. A window that is too
-//! narrow loses columns, then the ends of names and of lines; one that is too low loses lines, and the last one says how many.
+//! narrow loses columns, then the ends of names, then values stand below their names; one that is too low loses lines, and
+//! the last one says how many.
 
 use std::io;
 
@@ -19,10 +20,14 @@ use crate::{
 /// What the size is taken for where the terminal does not tell.
 const USUAL: (usize, usize) = (80, 24);
 
-/// Of a narrow window the values have as much as they need, up to so many columns with their state.
-const MOST_VALUE: usize = 26;
-/// A name has at least so many.
-const LEAST_NAME: usize = 8;
+/// Of a narrow window the values have as much as they need, up to so many columns.
+const MOST_VALUE: usize = 34;
+/// The longest that is said of a value beside it: `* changed`.
+const STATE: usize = 9;
+/// Between two columns.
+const GAP: usize = 2;
+/// Where a name has less than so many columns, values stand below their names.
+const LEAST_NAME: usize = 20;
 
 /// The table and where it stands.
 pub(super) struct Screen {
@@ -55,10 +60,9 @@ impl Screen {
     fn head(&self, state: &State<'_>, now: Timestamp, width: usize) -> Vec<String> {
         let style = terminal::style();
         let rounds = people::count(usize::try_from(state.rounds()).unwrap_or(usize::MAX), "round");
-        let mut lines = vec![
-            style.title(&self.title),
-            style.dim(&format!("Ctrl-C ends it; {rounds}, {}", now.strftime("%Y-%m-%d %H:%M:%S UTC"))),
-        ];
+        let times = format!("Ctrl-C ends it; {rounds}, {}", now.strftime("%Y-%m-%d %H:%M:%S UTC"));
+        let mut lines: Vec<String> = wrap(&self.title, width).iter().map(|line| style.title(line)).collect();
+        lines.extend(wrap(&times, width).iter().map(|line| style.dim(line)));
         if let Some(reason) = state.reason() {
             lines.extend(wrap(&format!("NO ANSWER: {reason}"), width).iter().map(|line| style.alarm(line)));
         }
@@ -84,7 +88,9 @@ impl Screen {
         }
         if shown < lines.len() {
             let more = people::count(lines.len() - shown, "more line");
-            text.push_str(&clip(&format!("{more}: name fewer POINTs, or make the window higher"), width));
+            let long = format!("{more}: name fewer POINTs, or make the window higher");
+            let line = if long.len() <= width { long } else { format!("{more}: name fewer POINTs") };
+            text.push_str(&clip(&line, width));
             text.push_str("\x1b[K\n");
         }
         text.push_str("\x1b[J");
@@ -94,10 +100,53 @@ impl Screen {
     }
 }
 
+/// A point under watch as it is shown.
+struct Entry<'a> {
+    seen: &'a Seen<'a>,
+    name: Cell,
+    values: Vec<Cell>,
+}
+
 fn table(state: &State<'_>, now: Timestamp, style: Style, width: usize) -> String {
     let profile = state.profile();
     let seen: Vec<Seen<'_>> = state.points().iter().filter_map(|index| state.seen(*index, now)).collect();
-    let mut table = Table::new([
+    let numbers = people::number_width(seen.iter().map(|seen| (seen.point, &seen.reading)));
+    let entries: Vec<Entry<'_>> = seen
+        .iter()
+        .map(|seen| Entry {
+            seen,
+            name: seen.point.name.as_str().into(),
+            values: people::lines(seen.point, &seen.reading, numbers),
+        })
+        .collect();
+    let widest = entries.iter().flat_map(|entry| &entry.values).map(Cell::width).max().unwrap_or_default();
+    // Names give way, then values; what is said of a value beside it never does.
+    let name_room = width.saturating_sub(widest.min(MOST_VALUE) + STATE + 2 * GAP);
+    let longest = entries.iter().map(|entry| entry.name.width()).max().unwrap_or_default();
+    let is_wide = name_room >= LEAST_NAME.min(longest);
+    let name_room = name_room.min(longest);
+    let mut table = match is_wide {
+        true => wide(),
+        false => narrow(),
+    };
+    for group in &profile.groups {
+        let mut own =
+            entries.iter().filter(|entry| profile.group(entry.seen.point).id == group.id).peekable();
+        if own.peek().is_some() {
+            table.title(group.title.as_str());
+        }
+        for entry in own {
+            match is_wide {
+                true => entry.beside_its_name(&mut table, name_room, width),
+                false => entry.below_its_name(&mut table, width),
+            }
+        }
+    }
+    table.render(style, Some(width))
+}
+
+fn wide() -> Table {
+    Table::new([
         ("ADDRESS", Align::Right),
         ("NAME", Align::Left),
         ("VALUE", Align::Left),
@@ -105,38 +154,42 @@ fn table(state: &State<'_>, now: Timestamp, style: Style, width: usize) -> Strin
         ("AGE", Align::Right),
         ("POINT", Align::Left),
     ])
-    .optional(&["POINT", "ADDRESS", "AGE"]);
-    let numbers = people::number_width(seen.iter().map(|seen| (seen.point, &seen.reading)));
-    let name_room = width.saturating_sub(MOST_VALUE + 2).max(LEAST_NAME);
-    for group in &profile.groups {
-        let own = |seen: &&Seen<'_>| profile.group(seen.point).id == group.id;
-        if seen.iter().any(|seen| own(&seen)) {
-            table.title(group.title.as_str());
-        }
-        for seen in seen.iter().filter(own) {
-            let mut lines = people::lines(seen.point, &seen.reading, numbers).into_iter();
-            table.row([
-                Cell::dim(seen.point.address.to_string()),
-                shorten(&seen.point.name, name_room).into(),
-                lines.next().unwrap_or_default(),
-                note(seen),
-                Cell::dim(seen.age.map(age).unwrap_or_default()),
-                Cell::dim(seen.point.id.as_str()),
-            ]);
-            for line in lines {
-                let nothing = Cell::default;
-                table.row([nothing(), nothing(), line, nothing(), nothing(), nothing()]);
-            }
-        }
-    }
-    table.render(style, Some(width))
+    .optional(&["POINT", "ADDRESS", "AGE"])
 }
 
-/// A name that is too long, with a mark where it was cut.
-fn shorten(name: &str, room: usize) -> String {
-    match name.chars().count() <= room {
-        true => name.to_owned(),
-        false => name.chars().take(room.saturating_sub(1)).chain(['…']).collect(),
+fn narrow() -> Table {
+    Table::new([("  VALUE", Align::Left), ("STATE", Align::Left), ("AGE", Align::Right)]).optional(&["AGE"])
+}
+
+impl Entry<'_> {
+    fn beside_its_name(&self, table: &mut Table, name_room: usize, width: usize) {
+        let name = self.name.clone().shortened(name_room);
+        let room = MOST_VALUE.max(width.saturating_sub(name_room + STATE + 2 * GAP));
+        let mut lines = self.values.iter().map(|value| value.clone().shortened(room));
+        let Seen { point, age, .. } = self.seen;
+        table.row([
+            Cell::dim(point.address.to_string()),
+            name,
+            lines.next().unwrap_or_default(),
+            note(self.seen),
+            Cell::dim(age.map(self::age).unwrap_or_default()),
+            Cell::dim(point.id.as_str()),
+        ]);
+        for line in lines {
+            let nothing = Cell::default;
+            table.row([nothing(), nothing(), line, nothing(), nothing(), nothing()]);
+        }
+    }
+
+    fn below_its_name(&self, table: &mut Table, width: usize) {
+        table.across(self.name.clone().shortened(width));
+        let room = width.saturating_sub(2 + GAP + STATE);
+        let mut lines = self.values.iter().map(|value| value.indented().shortened(room + 2));
+        let age = Cell::dim(self.seen.age.map(age).unwrap_or_default());
+        table.row([lines.next().unwrap_or_default(), note(self.seen), age]);
+        for line in lines {
+            table.row([line, Cell::default(), Cell::default()]);
+        }
     }
 }
 
