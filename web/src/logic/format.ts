@@ -41,6 +41,12 @@ export function kindText({ vendor, model, models, kind }: DeviceView): string {
   return `${vendor} ${model ?? models.join(' / ')} · ${KINDS[kind]}`
 }
 
+/** What is wrong with reaching a device, where its name stands already. */
+export function faultText({ name, fault }: DeviceView): string {
+  const rest = fault?.startsWith(`${name} `) ? fault.slice(name.length + 1) : (fault ?? '')
+  return rest.charAt(0).toUpperCase() + rest.slice(1)
+}
+
 /** An age in the fewest characters that still tell: `3 s`, `12 min`, `5 h`, `3 d`. */
 export function ageText(ms: number): string {
   const seconds = Math.max(0, Math.floor(ms / 1000))
@@ -83,7 +89,8 @@ export function hoursText(hours: number, brief = false): string {
 export function joinedText(view: JoinedView | undefined): string {
   if (typeof view?.value === 'number') return hoursText(view.value)
   if (typeof view?.value === 'string') return view.value.replace('T', ' ')
-  return view?.quality === 'invalid' ? 'no data' : 'not read yet'
+  if (view?.quality === 'invalid') return 'no data'
+  return view?.quality === 'bad' && !view.ts ? 'never read' : 'not read yet'
 }
 
 /** Time of day in the reader's zone, with the date in front unless it is today. */

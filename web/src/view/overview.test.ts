@@ -117,7 +117,7 @@ test('alarms stand by class on the card, and summed for the site', () => {
 })
 
 test('what is not heard looks it: a device that is gone, then the gateway', async () => {
-  const fault = 'Genset 2 cannot be read: unit 2 did not answer'
+  const fault = 'Genset gen2 cannot be read: unit 2 did not answer'
   show(
     snapshot([
       { device: device('gen1'), values: [value('kw', 1)] },
@@ -134,7 +134,7 @@ test('what is not heard looks it: a device that is gone, then the gateway', asyn
   )
   await filled('gen2')
   expect(text(document.querySelector('[aria-label="Site"].sum'))).toContain('1 of 2 controllers answering')
-  expect(text(card('gen2'))).toContain(fault)
+  expect(text(card('gen2'))).toContain('Cannot be read: unit 2 did not answer')
   expect(text(card('gen2'))).toContain('Not answering · heard 1 min ago')
   expect(text(card('gen2'))).toContain('Alarms not known')
   expect(text(card('gen2').querySelector('.struck'))).toContain('7')
@@ -146,7 +146,7 @@ test('what is not heard looks it: a device that is gone, then the gateway', asyn
 
 test('a device that was never heard shows no values, and says so', () => {
   show(snapshot([{ device: device('gen1', { online: false, last_seen: null }), values: [] }]))
-  expect(text(card('gen1'))).toContain('Not asked yet · not heard yet')
+  expect(text(card('gen1'))).toContain('No answer yet · not heard yet')
   expect(text(card('gen1'))).toContain('Alarms not known')
   expect(card('gen1').querySelector('.values')).toBeNull()
 })
