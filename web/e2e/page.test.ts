@@ -159,6 +159,13 @@ describe.each([LOOKS[0], LOOKS[3]])('on a %s', (name, viewport, scheme) => {
     expect(await overflow(page)).toBe(0)
     await page.screenshot({ path: `${SHOTS}${id}-${name}-${scheme}.png`, fullPage: true })
     expect(complaints).toEqual([])
+
+    // In whatever state it is, the page is no wider: every word is now as long as the longest.
+    await page.evaluate(() => {
+      for (const value of document.querySelectorAll('.words .value, [data-testid]'))
+        value.textContent = 'Synchronization for load transfer to mains'
+    })
+    expect(await overflow(page)).toBe(0)
     await page.close()
   })
 
@@ -296,6 +303,7 @@ test('a gateway that goes away is told within seconds, and it comes back by itse
   await page.screenshot({ path: `${SHOTS}lost.png` })
   await page.getByRole('link', { name: 'Overview' }).click()
   await page.getByText('As last heard:').waitFor()
+  expect(await page.locator(`${cardOf('genset-1')} dd.stale`).count()).toBeGreaterThan(5)
   expect(await page.locator('[data-device] dd.good').count()).toBe(0)
   await page.screenshot({ path: `${SHOTS}lost-overview.png` })
 
@@ -326,6 +334,7 @@ test.runIf(process.env.BUSBAR_SCREENSHOT === '1')(
       { timeout: 300_000 },
     )
     await page.screenshot({ path: `${DOCS}screenshot.png`, fullPage: true })
+    await page.setViewportSize({ width: 1280, height: 640 })
     await page.goto(`${demo.address}#/wires/line`)
     await page.getByRole('heading', { name: 'Wire line' }).waitFor()
     await page.screenshot({ path: `${DOCS}wires.png` })

@@ -32,7 +32,7 @@ const filled = (id: string) =>
   vi.waitFor(() => {
     flushSync()
     expect(card(id).querySelector('.values')).not.toBeNull()
-  })
+  }, 5000)
 
 beforeEach(() => {
   location.hash = ''

@@ -46,7 +46,7 @@ async function show(first: Snapshot): Promise<void> {
   page.start()
   app = mount(App, { target: document.body, props: { page } })
   emit('snapshot', first)
-  await vi.waitFor(() => expect(document.querySelector('[data-point]')).not.toBeNull())
+  await vi.waitFor(() => expect(document.querySelector('[data-point]')).not.toBeNull(), 5000)
   flushSync()
 }
 
