@@ -377,6 +377,8 @@ export interface components {
              * @example D-500
              */
             model: string | null;
+            /** @description The models that its profile is for. */
+            models: string[];
             /**
              * @description Its name in the site file.
              * @example Genset 1
@@ -1261,7 +1263,14 @@ export interface operations {
     };
     points: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description Only what carries one of these signals: ids of the shared vocabulary with commas between them. Those that the
+                 *     device does not have are passed over.
+                 * @example genset.power.active,breaker.genset.closed
+                 */
+                signal?: string;
+            };
             header?: never;
             path: {
                 /**
@@ -1281,6 +1290,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["PointsView"];
+                };
+            };
+            /** @description The query is not understood */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description There is no such device */

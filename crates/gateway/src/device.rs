@@ -401,6 +401,7 @@ impl Device {
             vendor: profile.vendor.clone(),
             kind: profile.kind.into(),
             model: self.model.map(str::to_owned),
+            models: profile.models.clone(),
             wire: self.wire.clone(),
             unit: *unit,
             online: self.online,

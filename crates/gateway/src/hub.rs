@@ -16,7 +16,7 @@ use crate::api::types::{
     AlarmView, AlarmsEvent, DeviceSnapshot, DeviceView, JoinedView, PointsView, SiteInfo, SiteView,
     SnapshotEvent, Time, ValueView, ValuesEvent, WireDetailView, WireView,
 };
-use crate::api::{Problem, ValuesQuery};
+use crate::api::{PointsQuery, Problem, ValuesQuery};
 use crate::device::{Changes, Device, Round, points_view};
 use crate::events::{Event, frame};
 use crate::joined;
@@ -172,8 +172,12 @@ impl Hub {
         Ok(self.slot(id)?.lock().device.view())
     }
 
-    pub(crate) fn points(&self, id: &str) -> Result<PointsView, Problem> {
-        Ok(self.slot(id)?.points.clone())
+    pub(crate) fn points(&self, id: &str, query: &PointsQuery) -> Result<PointsView, Problem> {
+        let points = &self.slot(id)?.points;
+        Ok(match &query.signal {
+            Some(signals) => points.carrying(&signals.split(',').collect::<Vec<_>>()),
+            None => points.clone(),
+        })
     }
 
     pub(crate) fn values(&self, id: &str, query: &ValuesQuery) -> Result<Vec<ValueView>, Problem> {

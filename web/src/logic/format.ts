@@ -1,4 +1,5 @@
 // Numbers, units and times as text. A number is never rounded: what the gateway sent is what is shown.
+import type { DeviceView, JoinedView } from './types'
 
 /** The digits of a number as JSON carried them: no exponent, no float tail, no grouping. */
 export function numberText(value: number): string {
@@ -31,6 +32,19 @@ const UNITS: Record<string, string> = {
 
 export function unitText(unit: string | null | undefined): string {
   return unit ? (UNITS[unit] ?? unit) : ''
+}
+
+const KINDS = { genset: 'genset', transfer_switch: 'transfer switch', compressor: 'compressor' }
+
+/** What a controller is: maker, model (or those it may be), kind. */
+export function kindText({ vendor, model, models, kind }: DeviceView): string {
+  return `${vendor} ${model ?? models.join(' / ')} · ${KINDS[kind]}`
+}
+
+/** What is wrong with reaching a device, where its name stands already. */
+export function faultText({ name, fault }: DeviceView): string {
+  const rest = fault?.startsWith(`${name} `) ? fault.slice(name.length + 1) : (fault ?? '')
+  return rest.charAt(0).toUpperCase() + rest.slice(1)
 }
 
 /** An age in the fewest characters that still tell: `3 s`, `12 min`, `5 h`, `3 d`. */
@@ -69,6 +83,14 @@ export function hoursText(hours: number, brief = false): string {
   const minutes = Math.floor(seconds / 60)
   const text = `${hours < 0 ? '-' : ''}${Math.floor(minutes / 60)} h ${pad(minutes % 60)} min`
   return brief ? text : `${text} ${pad(seconds % 60)} s`
+}
+
+/** What several points make up, in full. */
+export function joinedText(view: JoinedView | undefined): string {
+  if (typeof view?.value === 'number') return hoursText(view.value)
+  if (typeof view?.value === 'string') return view.value.replace('T', ' ')
+  if (view?.quality === 'invalid') return 'no data'
+  return view?.quality === 'bad' && !view.ts ? 'never read' : 'not read yet'
 }
 
 /** Time of day in the reader's zone, with the date in front unless it is today. */

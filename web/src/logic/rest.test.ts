@@ -2,9 +2,9 @@ import { readFileSync } from 'node:fs'
 import { resolve } from 'node:path'
 import { describe, expect, test } from 'vitest'
 import { lampsOf } from './lamps'
-import { deviceLink, parseRoute, wireLink } from './route'
+import { deviceLink, parseRoute, SITE_LINK, wireLink } from './route'
 import { group, joined, point, value } from './samples'
-import { flagText, TILES, tilesOf } from './vitals'
+import { cardOf, feedText, flagText, signalsOf, TILES, tilesOf } from './vitals'
 
 describe('the address', () => {
   test.each(['gen1', 'ATS north/2', 'ö%'])('of device %s leads back to it', (id) => {
@@ -21,7 +21,10 @@ describe('the address', () => {
   test('of the wires leads to them, with or without one', () => {
     expect(parseRoute(wireLink())).toEqual({ view: 'wires', device: undefined, wire: undefined })
     expect(parseRoute(wireLink('bus 1/ö'))).toMatchObject({ view: 'wires', wire: 'bus 1/ö' })
-    expect(parseRoute('#/').view).toBe('device')
+  })
+
+  test.each(['', SITE_LINK, '#/devices', '#/anything/else'])('%s leads to the overview', (hash) => {
+    expect(parseRoute(hash).view).toBe('site')
   })
 })
 
@@ -69,16 +72,56 @@ describe('the values at a glance', () => {
     )
     expect(tiles.map(({ title, kind }) => [title, kind])).toEqual([
       ['Source 1', 'point'],
-      ['Source 1 switch', 'flag'],
       ['Source 1 voltage', 'point'],
+      ['Source 1 switch', 'flag'],
       ['Source 1 supplied', 'joined'],
     ])
-    const flag = tiles[1]
+    const flag = tiles[2]
     if (flag?.kind !== 'flag') throw new Error('a flag')
     expect(flagText(flag, value('position', ['S1 closed'], { set: [4] }))).toBe('closed')
     expect(flagText(flag, value('position', [], { set: [] }))).toBe('open')
     expect(flagText(flag, value('position', null, { quality: 'invalid' }))).toBeUndefined()
     expect(flagText(flag, undefined)).toBeUndefined()
+  })
+
+  test('which source carries a load follows from the three switches', () => {
+    const bit = (bit: number, signal: string) => ({
+      bit,
+      id: signal,
+      label: signal,
+      class: 'status' as const,
+      signal,
+    })
+    const switches = point('switches', {
+      type: 'bits',
+      bits: [bit(4, 'breaker.src1.closed'), bit(5, 'breaker.src2.closed')],
+    })
+    const tie = point('tie', { type: 'bits', bits: [bit(7, 'breaker.tie.closed')] })
+    const feeds = tilesOf([group('S', [switches, tie])]).filter((tile) => tile.kind === 'feed')
+    const loads = (closed: number[], tied: boolean) => {
+      const word = value('switches', [], { set: closed })
+      const tieWord = value('tie', [], { set: tied ? [7] : [] })
+      return feeds.map((feed) => feedText(feed, [word, tieWord, word]))
+    }
+    expect(loads([4, 5], false)).toEqual(['on source 1', 'on source 2'])
+    expect(loads([5], true)).toEqual(['on source 2', 'on source 2'])
+    expect(loads([4], false)).toEqual(['on source 1', 'on none'])
+    expect(loads([], true)).toEqual(['on none', 'on none'])
+    expect(loads([4, 5], true)).toEqual(['on both sources', 'on both sources'])
+    expect(feeds.map((feed) => feedText(feed, [undefined, undefined, undefined]))).toEqual([
+      undefined,
+      undefined,
+    ])
+    expect(tilesOf([group('S', [switches])]).some((tile) => tile.kind === 'feed')).toBe(false)
+  })
+
+  test.each([
+    ['genset', 12],
+    ['transfer_switch', 9],
+    ['compressor', 9],
+  ] as const)('on the card of a %s make whole rows', (kind, count) => {
+    expect(cardOf(kind)).toHaveLength(count)
+    expect(signalsOf(cardOf(kind)).length).toBeGreaterThan(0)
   })
 
   test('of a compressor are its discharge, whether it is loaded, and its hours', () => {

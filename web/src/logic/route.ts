@@ -1,16 +1,19 @@
 // Which view the address names. The part after # stays in the browser, so a path prefix of a proxy never matters.
 
 export interface Route {
-  view: 'device' | 'wires'
+  view: 'site' | 'device' | 'wires'
   device: string | undefined
   wire: string | undefined
 }
+
+export const SITE_LINK = '#/'
 
 export function parseRoute(hash: string): Route {
   const [, view, rest] = /^#\/([a-z]+)(?:\/([^/]+))?$/.exec(hash) ?? []
   const id = rest ? decoded(rest) : undefined
   if (view === 'wires') return { view: 'wires', device: undefined, wire: id }
-  return { view: 'device', device: view === 'devices' ? id : undefined, wire: undefined }
+  if (view === 'devices' && id !== undefined) return { view: 'device', device: id, wire: undefined }
+  return { view: 'site', device: undefined, wire: undefined }
 }
 
 export function wireLink(id?: string): string {

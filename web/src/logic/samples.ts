@@ -53,6 +53,7 @@ export function device(id: string, rest: Partial<DeviceView> = {}): DeviceView {
     vendor: 'Datakom',
     kind: 'genset',
     model: 'D-500',
+    models: ['D-300', 'D-500', 'D-700'],
     wire: id,
     unit: 1,
     online: true,

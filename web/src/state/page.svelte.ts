@@ -1,6 +1,7 @@
 // What the page is made of, in one place: the clock, the stream, the site, and the points fetched beside them.
 import { parseRoute, type Route } from '../logic/route'
 import type { PointsView } from '../logic/types'
+import { cardOf, signalsOf, tilesOf } from '../logic/vitals'
 import { Clock } from './clock.svelte'
 import { Site, type Device } from './site.svelte'
 import { Stream, type Source } from './stream.svelte'
@@ -36,20 +37,34 @@ export class Page {
     return this.stream.phase === 'live'
   }
 
-  /** The device that the address names, or the first. */
+  /** The device that the address names. */
   get device(): Device | undefined {
-    const wanted = this.route.device
-    return wanted === undefined ? this.site.devices[0] : this.site.device(wanted)
+    return this.route.device === undefined ? undefined : this.site.device(this.route.device)
   }
 
-  /** Fetches what the points of a device are, again and again until it is there or `signal` says stop. */
-  async loadPoints(device: Device, signal: AbortSignal): Promise<void> {
-    while (!signal.aborted && !device.groups) {
+  /** Fetches what the points of a device are. */
+  loadPoints(device: Device, signal: AbortSignal): Promise<void> {
+    return this.#fetch(device, '', signal, ({ groups, joined }) => {
+      device.joined = joined
+      device.groups = groups
+    })
+  }
+
+  /** Fetches what its card shows. */
+  loadGlance(device: Device, signal: AbortSignal): Promise<void> {
+    const card = cardOf(device.view.kind)
+    const query = `?signal=${signalsOf(card).join(',')}`
+    return this.#fetch(device, query, signal, ({ groups, joined }) => {
+      device.glance = tilesOf(groups, joined, card)
+    })
+  }
+
+  /** Again and again until the points are there or `signal` says stop. */
+  async #fetch(device: Device, query: string, signal: AbortSignal, take: (points: PointsView) => void) {
+    while (!signal.aborted) {
       try {
-        const path = `devices/${encodeURIComponent(device.view.id)}/points`
-        const points = (await this.get(path, signal)) as PointsView
-        device.joined = points.joined
-        device.groups = points.groups
+        const path = `devices/${encodeURIComponent(device.view.id)}/points${query}`
+        return take((await this.get(path, signal)) as PointsView)
       } catch {
         // The stream's banner tells about a lost gateway; here it only takes longer.
         await new Promise((resolve) => setTimeout(resolve, RETRY_MS))

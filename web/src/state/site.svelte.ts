@@ -14,6 +14,7 @@ import type {
   ValuesEvent,
   ValueView,
 } from '../logic/types'
+import type { Tile } from '../logic/vitals'
 import type { EventName } from './stream.svelte'
 
 /** One point's value. Each has its own state, so that a change redraws one cell. */
@@ -38,6 +39,8 @@ export class Device {
   groups = $state.raw<readonly GroupView[]>()
   /** What several points make up, fetched with the points. */
   joined = $state.raw<readonly JoinedPointView[]>([])
+  /** What its card in the overview is made of, fetched alone: the rest is much more. */
+  glance = $state.raw<readonly Tile[]>()
   /** What they make up now, by signal. */
   whole = $state<Record<string, JoinedView>>({})
   /** When the last round of each rate was read. */
@@ -61,6 +64,17 @@ export class Device {
     const { online, last_seen } = this.view
     const times = [timeOf(last_seen), ...(online ? [this.rounds.fast, this.rounds.slow] : [])]
     return times.reduce((a, b) => (a === undefined || (b !== undefined && b > a) ? b : a), undefined)
+  }
+
+  /**
+   * Seconds left in its state. Counted on from the round that read them, never beyond: a timer that stands still is
+   * shown standing still.
+   */
+  leftAt(now: number): number | undefined {
+    const timer = this.view.state?.timer_s
+    if (!timer) return undefined
+    const since = Math.min(Math.max(0, now - (this.rounds.fast ?? now)), 10_000)
+    return Math.max(0, timer - Math.floor(since / 1000))
   }
 
   /** Everything the gateway knows of the values, after a gap in the stream. */

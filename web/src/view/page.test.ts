@@ -2,6 +2,7 @@
 import { flushSync, mount, unmount } from 'svelte'
 import { afterEach, beforeEach, expect, test, vi } from 'vitest'
 import App from '../App.svelte'
+import { deviceLink } from '../logic/route'
 import { alarm, device, group, joined, point, snapshot, stamp, START, value } from '../logic/samples'
 import type { GroupView, JoinedPointView, Snapshot } from '../logic/types'
 import { Page } from '../state/page.svelte'
@@ -37,6 +38,7 @@ async function show(first: Snapshot): Promise<void> {
     flushSync()
   }
   vi.stubGlobal('fetch', async () => Response.json({ groups, joined: whole }))
+  location.hash = deviceLink(first.devices[0]?.device.id ?? '')
   page = new Page(() => ({
     addEventListener: (type, act) => listeners.set(type, act),
     close: () => undefined,
@@ -44,7 +46,7 @@ async function show(first: Snapshot): Promise<void> {
   page.start()
   app = mount(App, { target: document.body, props: { page } })
   emit('snapshot', first)
-  await vi.waitFor(() => expect(document.querySelector('[data-point]')).not.toBeNull())
+  await vi.waitFor(() => expect(document.querySelector('[data-point]')).not.toBeNull(), 5000)
   flushSync()
 }
 
@@ -188,7 +190,16 @@ test('the countdown runs between two rounds and stands still with the device', a
 })
 
 test('hours out of several points stand at a glance and in full', async () => {
-  whole = [joined('engine.hours', { meaning: 'Hours the engine has run' }), joined('clock', { unit: null })]
+  groups = [
+    group(
+      'Counters',
+      ['volts', 'hours', 'minutes', 'year'].map((id) => point(id)),
+    ),
+  ]
+  whole = [
+    joined('engine.hours', { meaning: 'Hours the engine has run', points: ['hours', 'minutes'] }),
+    joined('clock', { unit: null, points: ['year'] }),
+  ]
   const hours = {
     signal: 'engine.hours',
     value: 1234.5083,
@@ -215,6 +226,7 @@ test('hours out of several points stand at a glance and in full', async () => {
   const bad = { ...later, quality: 'bad' }
   emit('values', { device: 'air1', joined: [bad], rate: 'slow', ts: stamp(20), changed: [] })
   expect(text(document.querySelector('[aria-label="At a glance"] .struck'))).toBe('1234 h 31 min')
+  expect(text(line('hours').querySelector('.struck'))).toBe('1234 h 31 min 00 s')
 })
 
 test('a switch stands as its flag says', async () => {

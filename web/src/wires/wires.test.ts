@@ -36,7 +36,7 @@ const until = async (check: () => void) => {
   await vi.waitFor(() => {
     flushSync()
     check()
-  })
+  }, 5000)
 }
 
 beforeEach(() => {

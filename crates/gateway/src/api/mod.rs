@@ -90,20 +90,34 @@ async fn device(
     hub.device_view(&known(device)?).map(Json)
 }
 
+/// Which points of a device are wanted.
+#[derive(Debug, Default, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct PointsQuery {
+    /// Only what carries one of these signals: ids of the shared vocabulary with commas between them. Those that the
+    /// device does not have are passed over.
+    #[param(example = "genset.power.active,breaker.genset.closed")]
+    pub(crate) signal: Option<String>,
+}
+
 /// The points of one device: what there is to read. It does not change while the gateway runs.
 #[utoipa::path(
     get, path = "/api/v1/devices/{device}/points", tag = "site",
-    params(("device" = String, Path, description = "Id of the device", example = "gen1")),
+    params(("device" = String, Path, description = "Id of the device", example = "gen1"), PointsQuery),
     responses(
         (status = OK, body = PointsView, description = "Its points, in groups"),
+        (status = BAD_REQUEST, body = Problem, content_type = "application/problem+json", description = "The query is not understood"),
         (status = NOT_FOUND, body = Problem, content_type = "application/problem+json", description = "There is no such device"),
     ),
 )]
 async fn points(
     State(hub): State<Arc<Hub>>,
     device: Result<Path<String>, PathRejection>,
+    query: Result<Query<PointsQuery>, QueryRejection>,
 ) -> Result<Json<PointsView>, Problem> {
-    hub.points(&known(device)?).map(Json)
+    let Query(query) = query.map_err(bad_query)?;
+    hub.points(&known(device)?, &query).map(Json)
 }
 
 /// Which values of a device are wanted.

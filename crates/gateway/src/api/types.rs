@@ -66,6 +66,9 @@ pub struct DeviceView {
     /// The model it says it is; null until it has said so, or when it is one the profile does not know.
     #[schema(required, examples("D-500"))]
     pub model: Option<String>,
+    /// The models that its profile is for.
+    #[schema(examples(json!(["D-300", "D-500", "D-700"])))]
+    pub models: Vec<String>,
     /// Id of the wire it is on.
     #[schema(examples("gen1"))]
     pub wire: String,
@@ -163,6 +166,30 @@ pub struct PointsView {
     pub groups: Vec<GroupView>,
     /// What several of its points make up, in the order of the profile.
     pub joined: Vec<JoinedPointView>,
+}
+
+impl PointsView {
+    /// The part of it that carries one of these signals: points that are it, bits that are it, joined signals.
+    pub(crate) fn carrying(&self, signals: &[&str]) -> Self {
+        let wanted = |signal: &Option<String>| signal.as_deref().is_some_and(|id| signals.contains(&id));
+        let point = |point: &PointView| {
+            let bits: Vec<BitView> = point.bits.iter().filter(|bit| wanted(&bit.signal)).cloned().collect();
+            (wanted(&point.signal) || !bits.is_empty()).then(|| PointView { bits, ..point.clone() })
+        };
+        let groups = self.groups.iter().map(|group| GroupView {
+            points: group.points.iter().filter_map(point).collect(),
+            ..group.clone()
+        });
+        Self {
+            groups: groups.filter(|group| !group.points.is_empty()).collect(),
+            joined: self
+                .joined
+                .iter()
+                .filter(|joined| signals.contains(&joined.signal.as_str()))
+                .cloned()
+                .collect(),
+        }
+    }
 }
 
 /// What a joined signal is: one value out of several points, such as hours out of hours, minutes and seconds.

@@ -66,6 +66,22 @@ async fn values_can_be_chosen() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn points_can_be_chosen_by_signal() {
+    let bench = Bench::new().await;
+    let points = "/api/v1/devices/gen1/points";
+    let of = async |query: &str| bench.client.get(&format!("{points}{query}")).await.json();
+    let two = of("?signal=breaker.genset.closed,genset.power.active,src1.frequency").await;
+    let groups = two["groups"].as_array().unwrap();
+    assert_eq!(groups.len(), 2, "the groups that have none are left out: {two}");
+    assert_eq!(groups[0]["points"][0]["id"], "genset_active_power");
+    let flags = &groups[1]["points"][0];
+    assert_eq!(flags["bits"].as_array().unwrap().len(), 1, "of an array only the bit that was asked for");
+    assert_eq!(flags["bits"][0]["signal"], "breaker.genset.closed");
+    assert_eq!(of("?signal=").await, serde_json::json!({ "groups": [], "joined": [] }));
+    bench.client.get(&format!("{points}?signals=fuel.level")).await.problem(400);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn nothing_can_be_changed() {
     let bench = Bench::new().await;
     for method in ["POST", "PUT", "PATCH", "DELETE"] {
