@@ -97,6 +97,13 @@ pub(crate) fn quick() -> Options {
     Options { timeout: QUICK, retries: 0, ..options() }
 }
 
+/// A link whose wire is up: what is asked of it leaves, and does not spend its short time on connecting.
+pub(crate) async fn connected(endpoint: Endpoint, options: Options) -> Link {
+    let link = Link::open(endpoint, options).unwrap();
+    wait_until(&link, |state| *state == WireState::Connected).await;
+    link
+}
+
 pub(crate) fn frame(body: &[u8]) -> Vec<u8> {
     [body, &rtu::crc16(body).to_le_bytes()].concat()
 }
