@@ -1115,7 +1115,7 @@ export interface components {
         WireView: {
             /**
              * @description Where it leads.
-             * @example tcp://192.168.1.20:502
+             * @example tcp://192.0.2.20:502
              */
             endpoint: string;
             /**
@@ -1125,7 +1125,7 @@ export interface components {
             id: string;
             /**
              * @description Why it is down; null otherwise.
-             * @example tcp://192.168.1.20:502: connection refused: check the port, and that the device is on and takes Modbus connections
+             * @example tcp://192.0.2.20:502: connection refused: check the port, and that the device is on and takes Modbus connections
              */
             reason: string | null;
             /** @description Whether it is connected. */

@@ -169,7 +169,7 @@ pub(crate) struct Read {
     /// A built-in profile or a path to a profile file
     #[arg(value_name = "KEY")]
     pub(crate) key: String,
-    /// The wire, for example tcp://192.168.1.10:502
+    /// The wire, for example tcp://192.0.2.10:502
     #[arg(long, value_name = "URL", value_parser = endpoint)]
     pub(crate) from: Endpoint,
     /// Unit id of the controller [default: the profile's]
@@ -187,7 +187,7 @@ pub(crate) struct Watch {
     /// A built-in profile or a path to a profile file
     #[arg(value_name = "KEY")]
     pub(crate) key: String,
-    /// The wire, for example tcp://192.168.1.10:502
+    /// The wire, for example tcp://192.0.2.10:502
     #[arg(long, value_name = "URL", value_parser = endpoint)]
     pub(crate) from: Endpoint,
     /// Unit id of the controller [default: the profile's]
@@ -214,7 +214,7 @@ pub(crate) struct Order {
     /// Its arguments, for example press=long
     #[arg(value_name = "ARG=VALUE", value_parser = argument)]
     pub(crate) arguments: Vec<(String, String)>,
-    /// The wire, for example tcp://192.168.1.10:502
+    /// The wire, for example tcp://192.0.2.10:502
     #[arg(long, value_name = "URL", value_parser = endpoint)]
     pub(crate) to: Endpoint,
     /// Unit id of the controller [default: the profile's]
@@ -229,7 +229,7 @@ pub(crate) struct Order {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Registers {
-    /// The wire, for example tcp://192.168.1.10:502
+    /// The wire, for example tcp://192.0.2.10:502
     #[arg(value_name = "URL", value_parser = endpoint)]
     pub(crate) endpoint: Endpoint,
     /// Address of the first register, decimal or 0x hex

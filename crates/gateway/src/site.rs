@@ -120,7 +120,7 @@ impl Site {
 }
 
 const ENDPOINT_HELP: &str =
-    "write an endpoint such as \"tcp://192.168.1.20:502\" or \"rtu:///dev/ttyUSB0?baud=9600\"";
+    "write an endpoint such as \"tcp://192.0.2.20:502\" or \"rtu:///dev/ttyUSB0?baud=9600\"";
 const KEYS: &[&str] = &["site", "server", "wires", "devices"];
 const SITE_KEYS: &[&str] = &["name"];
 const SERVER_KEYS: &[&str] = &["listen"];
@@ -176,7 +176,7 @@ fn wires(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<PlacedWire> 
     for table in root.tables("wires", "[[wires]]", WIRE_KEYS, findings) {
         let id = id(&table, "wire", wires.iter().map(|wire| wire.id.as_str()), findings);
         let endpoint =
-            table.required("endpoint", "\"tcp://192.168.1.20:502\"", findings, |table, key, findings| {
+            table.required("endpoint", "\"tcp://192.0.2.20:502\"", findings, |table, key, findings| {
                 endpoint(table, key, &wires, findings)
             });
         let timeout = table.duration("timeout", TIMEOUT, findings).map(|timeout| timeout.value);

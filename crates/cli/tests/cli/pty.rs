@@ -216,8 +216,7 @@ fn what_is_said_of_a_value_is_never_cut() {
         0 | 1 => request.registers(&vec![0xFFFF; request.count.into()]),
         _ => Vec::new(),
     });
-    for (columns, name) in
-        [(80, "Shutdown alarms 2: engine, auxil…"), (30, "Shutdown alarms 2: engine, au…")]
+    for (columns, name) in [(80, "Shutdown alarms 2: engine, auxil…"), (30, "Shutdown alarms 2: engine, au…")]
     {
         let arguments = "smartgen-acc1700 --unit 1 --every 20ms --timeout 50ms --spacing 0";
         let points = "shutdown_alarms_2 common_status battery_voltage";

@@ -9,7 +9,7 @@ listen = "[::1]:9090"
 
 [[wires]]
 id = "gen1"
-endpoint = "tcp://192.168.1.20"
+endpoint = "tcp://192.0.2.20"
 timeout = "500ms"
 
 [[wires]]
@@ -19,7 +19,7 @@ spacing = "20ms"
 
 [[wires]]
 id = "converter"
-endpoint = "rtu+tcp://192.168.1.30:4001"
+endpoint = "rtu+tcp://192.0.2.30:4001"
 
 [[devices]]
 id = "gen1"
@@ -66,7 +66,7 @@ fn mistakes(text: &str) -> Vec<String> {
 fn a_whole_site_file() {
     let site = Site::parse("site.toml", WHOLE).unwrap();
     assert_eq!((site.name.as_str(), site.listen.to_string().as_str()), ("North hospital", "[::1]:9090"));
-    assert_eq!(site.wires[0].endpoint.to_string(), "tcp://192.168.1.20:502");
+    assert_eq!(site.wires[0].endpoint.to_string(), "tcp://192.0.2.20:502");
     assert_eq!(site.wires[0].timeout, Some(Duration::from_millis(500)));
     assert_eq!((site.wires[1].timeout, site.wires[0].spacing), (None, None));
     assert_eq!(site.wires[1].spacing, Some(Duration::from_millis(20)));
@@ -130,7 +130,7 @@ fn every_mistake_has_its_place_and_remedy() {
         ),
         (
             &with("[[wires]]\nid = \"w\""),
-            "site.toml:2:1: `endpoint` is missing in [[wires]]; add `endpoint = \"tcp://192.168.1.20:502\"`",
+            "site.toml:2:1: `endpoint` is missing in [[wires]]; add `endpoint = \"tcp://192.0.2.20:502\"`",
         ),
         (
             &with("[[wires]]\nid = \"w\"\nendpoint = \"10.0.0.1:502\""),

@@ -87,7 +87,7 @@ async fn a_converter_takes_frames_of_the_line() {
         stream.read_exact(&mut request).await.unwrap();
         stream
     });
-    let link = open(endpoint, quick()).await;
+    let link = connected(endpoint, quick()).await;
     assert_eq!(read(&link).await, Ok(vec![2302]));
     assert_eq!(read(&link.with_timeout(Duration::from_secs(30))).await, Ok(vec![2303]));
     assert_eq!(link.statistics().echoes, 1);
@@ -165,7 +165,7 @@ async fn an_echo_alone_is_named() {
         let request = line.request();
         line.say(&request);
     });
-    let link = open(endpoint, quick()).await;
+    let link = connected(endpoint, quick()).await;
     let silent = read(&link).await.unwrap_err();
     assert!(matches!(silent, LinkError::Timeout { heard: Heard::Echo, .. }), "{silent}");
     assert!(silent.to_string().contains("the adapter echoes"), "{silent}");

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use busbar_link::{Heard, Link, LinkError, Options, WireState, Write};
+use busbar_link::{Heard, Link, LinkError, Options, Write};
 
 use crate::slave::*;
 
@@ -15,7 +15,7 @@ async fn heard(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (Heard, Li
         let answer = answer(&request);
         line.say(&answer);
     });
-    let link = open(endpoint, quick()).await;
+    let link = connected(endpoint, quick()).await;
     let error = read(&link).await.unwrap_err();
     slave.join().unwrap();
     let LinkError::Timeout { heard, .. } = error else { panic!("{error}") };
@@ -58,8 +58,7 @@ async fn an_answer_behind_noise_does_not_wait_for_the_deadline() {
         }
     });
     let patient = Options { timeout_floor: options().timeout, ..options() };
-    let link = Link::open(endpoint, patient).unwrap();
-    wait_until(&link, |state| *state == WireState::Connected).await;
+    let link = connected(endpoint, patient).await;
     let soon = Duration::from_secs(10);
     for value in [7, 8, 9] {
         // Long enough for the line to be silent: the caller sends and reads by himself.
@@ -89,8 +88,7 @@ async fn a_line_that_is_never_silent_is_named_and_soon() {
             line.say(&register(&request, 7));
         }
     });
-    let link = Link::open(endpoint, quick()).unwrap();
-    wait_until(&link, |state| *state == WireState::Connected).await;
+    let link = connected(endpoint, quick()).await;
     // On a busy machine a pause may slip in; then there is no answer.
     let mut named = false;
     for _ in 0..20 {
@@ -166,7 +164,7 @@ async fn a_late_answer_is_counted_and_not_taken() {
         let (request, _) = line.hear(8);
         line.say(&register(&request, 7));
     });
-    let link = open(endpoint, quick()).await;
+    let link = connected(endpoint, quick()).await;
     let error = read(&link).await.unwrap_err();
     assert!(matches!(error, LinkError::Timeout { .. }), "{error}");
     late.send(()).unwrap();

@@ -97,10 +97,10 @@ pub(crate) fn quick() -> Options {
     Options { timeout: QUICK, retries: 0, ..options() }
 }
 
-/// A link that is up: what it is asked from now on leaves, however short its time-out.
-pub(crate) async fn open(endpoint: Endpoint, options: Options) -> Link {
+/// A link whose wire is up: what is asked of it leaves, and does not spend its short time on connecting.
+pub(crate) async fn connected(endpoint: Endpoint, options: Options) -> Link {
     let link = Link::open(endpoint, options).unwrap();
-    link.state().wait_for(|state| *state == WireState::Connected).await.unwrap();
+    wait_until(&link, |state| *state == WireState::Connected).await;
     link
 }
 

@@ -12,7 +12,7 @@ pub struct WireView {
     #[schema(examples("gen1"))]
     pub id: String,
     /// Where it leads.
-    #[schema(examples("tcp://192.168.1.20:502"))]
+    #[schema(examples("tcp://192.0.2.20:502"))]
     pub endpoint: String,
     /// Whether it is connected.
     pub state: WireState,
@@ -20,7 +20,7 @@ pub struct WireView {
     #[schema(
         required,
         examples(
-            "tcp://192.168.1.20:502: connection refused: check the port, and that the device is on and takes Modbus connections"
+            "tcp://192.0.2.20:502: connection refused: check the port, and that the device is on and takes Modbus connections"
         )
     )]
     pub reason: Option<String>,
