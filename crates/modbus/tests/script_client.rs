@@ -562,14 +562,17 @@ fn rtu_silence_ends_what_hides_the_answer() {
 
 #[test]
 fn rtu_an_echo_is_no_confirmation() {
-    const ASKED: &str = "01 06 00 40 00 10 88 12";
+    const ASKED: &str = "01 06 00 40 00 10 89 D2";
     let mut client = Client::new(Framing::Rtu);
     play(&mut client, &[Ask(0, WRITE, ASKED)]);
     client.ignore_echo();
     // With noise in front and in pieces: nothing but a second copy confirms it.
-    play(&mut client, &[Come(10, "FF 01 06 00", Pending), Come(12, "40 00 10 88 12", Pending), NoResponse]);
+    play(&mut client, &[Come(10, "FF 01 06 00", Pending), Come(12, "40 00 10 89 D2", Pending), NoResponse]);
     play(&mut client, &[Come(30, ASKED, Answered)]);
-    assert_eq!(client.counters(), &counted(|counters| (counters.echoes, counters.garbage_bytes) = (1, 1)));
+    assert_eq!(
+        client.counters(),
+        &counted(|counters| (counters.echoes, counters.garbage_bytes, counters.crc_errors) = (1, 1, 1))
+    );
 
     // The device may refuse, and the next transaction begins anew.
     play(&mut client, &[Ask(100, WRITE, ASKED)]);
