@@ -41,6 +41,11 @@ impl SerialPort {
         Ok(port)
     }
 
+    /// Whether it is the near end of a pseudo-terminal, which passes every byte on at once.
+    pub fn is_pseudo_terminal(&self) -> bool {
+        self.claim.is_pseudo()
+    }
+
     /// One setting after the other, so that the one that is refused can be named.
     fn set(&mut self, serial: &Serial) -> Result<(), SerialError> {
         let port = &mut self.port;
@@ -255,6 +260,10 @@ impl Claim {
         }
     }
 
+    fn is_pseudo(&self) -> bool {
+        self.pseudo
+    }
+
     /// Carrier detect and the like are often not wired and float.
     fn ignore_modem_lines(&self) -> io::Result<()> {
         use rustix::termios::{ControlModes, OptionalActions, tcgetattr, tcsetattr};
@@ -295,6 +304,10 @@ struct Claim;
 impl Claim {
     fn new(_: &str) -> Result<Self, SerialError> {
         Ok(Self)
+    }
+
+    fn is_pseudo(&self) -> bool {
+        false
     }
 
     fn ignore_modem_lines(&self) -> io::Result<()> {

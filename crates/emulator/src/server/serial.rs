@@ -29,6 +29,8 @@ pub(super) enum Port {
 impl Port {
     fn line(&self, serial: &Serial) -> Line {
         match self {
+            // Somebody else's pseudo-terminal, as socat makes them, has no hardware either.
+            Self::Device(port) if port.is_pseudo_terminal() => Line::imitated(serial),
             Self::Device(_) => Line::real(serial),
             #[cfg(target_os = "linux")]
             Self::Pseudo(_) => Line::imitated(serial),

@@ -369,6 +369,23 @@ fn answered(mut far: File) -> impl Future<Output = (File, Vec<u8>)> {
 }
 
 #[tokio::test]
+async fn a_pseudo_terminal_of_somebody_else_keeps_line_time_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("line");
+    let mut far = plug_in(&path);
+    let emulation = on(&[&format!("rtu://{}?baud=2400", path.display())], &[unit(1)]).await;
+    // Who asks at once when the answer is through is answered: no time is counted twice.
+    for _ in 0..5 {
+        far.write_all(&who(1)).unwrap();
+        let answer;
+        (far, answer) = answered(far).await;
+        assert_eq!(answer, d500(1));
+    }
+    let statistics = emulation.statistics();
+    assert_eq!((statistics.requests, statistics.answers, statistics.collisions), (5, 5, 0));
+}
+
+#[tokio::test]
 async fn a_serial_device_is_served_and_served_again_when_it_is_back() {
     let path = std::env::temp_dir().join(format!("busbar-line-{}", std::process::id()));
     let mut far = plug_in(&path);
