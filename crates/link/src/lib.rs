@@ -11,17 +11,18 @@
 //!   being connected they wait as long as they would wait for an answer.
 //! - **A silent unit holds nobody up either.** After three time-outs in a row it is polled only in slots of its own that
 //!   grow from one second to thirty ([`Options::probes`]); other polls of it fail at once ([`LinkError::Silent`]).
-//!   What a person or a command asks goes through at once, and any answer, even a late one, ends the silence. The
+//!   What a person or a command asks goes through at once and waits as it always would, and any answer, even a late one, ends the silence. The
 //!   connection is not blamed for a silent unit while others on the wire answer. Where nobody answers, there is nobody
 //!   to protect and the connection is made anew.
 //! - **Commands go first**, then what a person waits for, then polling ([`Priority`]). Within one of these the unit that
 //!   was served longest ago goes first.
 //! - **A unit has its pause** ([`Link::with_spacing`]) from the end of its last exchange; others use the time.
 //! - **A read waits as long as its unit's latency suggests**, from [`Options::timeout_floor`] to the time-out of the
-//!   request, twice as long after each time-out. A write always waits the whole time-out. On a serial line the time of
-//!   the characters comes on top.
+//!   request, twice as long after each time-out. Its second try waits the whole time-out, and a write always does: who
+//!   is slow at times is not given up early. On a serial line the time of the characters comes on top.
 //! - **A serial line is kept legal and tight.** A request leaves 3.5 characters after the last byte heard, whoever it
-//!   was from, and no later. The gaps inside what is received mean nothing, because adapters deliver in pieces.
+//!   was from, and no later. The gaps inside what is received mean nothing, because adapters deliver in pieces. Where it
+//!   is never silent for so long, nobody waits for longer than for an answer ([`LinkError::NeverSilent`]).
 //! - **A late answer is nobody else's.** Over TCP its transaction tells. On RTU only unit, function and length do: so
 //!   while the answer to a lost request may still come, for twice the time-out, its unit is asked nothing else whose
 //!   answer looks the same. The same read may be asked again: either answer is right.

@@ -10,8 +10,8 @@ pub struct Options {
     /// How long an attempt to connect to one address may take. A host name may have several, and each is tried so long;
     /// to look them up may take as long again.
     pub connect_timeout: Duration,
-    /// How long each try of a request waits for its answer at most. Writes, and the first requests to a unit, wait so
-    /// long; reads wait as the unit's measured latency suggests.
+    /// How long each try of a request waits for its answer at most. Writes, the first requests to a unit and
+    /// second tries wait so long; other reads wait as the unit's measured latency suggests.
     pub timeout: Duration,
     /// The shortest that a read waits for its answer, however fast the unit is. From `timeout` on, latency changes
     /// nothing.
