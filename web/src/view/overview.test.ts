@@ -55,7 +55,7 @@ afterEach(async () => {
 
 test('a card a controller: what it is, does, and measures, and how old that is', async () => {
   const state = { code: 5, label: 'Cooling down', canonical: 'cooldown', timer_s: 67 }
-  const view = device('gen1', { state, mode: { code: 4, label: 'AUTO' } })
+  const view = device('gen1', { state, mode: { code: 4, label: 'AUTO', canonical: 'auto' } })
   show(
     snapshot([
       { device: view, values: [value('kw', 36.2, { unit: 'kW' })] },
