@@ -5,11 +5,11 @@ mod life;
 use std::time::Duration;
 
 use busbar_emulator::{Config, Device, StartError};
-use busbar_modbus::{ExceptionCode, Framing, Request, Response, Server};
+use busbar_modbus::{Framing, Request, Response, Server};
 use busbar_profile::WordOrder;
 use busbar_profile::command::{Next, Report, Run, Verdict, WriteOutcome};
 
-use crate::site::{Site, TENTH};
+use crate::site::{Answer, Site, TENTH, ask};
 
 const START: u16 = 0;
 const STOP: u16 = 1;
@@ -151,29 +151,6 @@ fn the_manuals_frames_get_the_manuals_answers() {
     let mut site = loaded();
     assert_eq!(on_the_wire(&mut site, &tables_11_and_12), tables_11_and_12);
     assert_eq!(status(&site), 8, "that frame was the key");
-}
-
-#[derive(Debug, PartialEq)]
-enum Answer {
-    Registers(usize),
-    Echo,
-    Exception(u8),
-    Silence,
-}
-
-fn ask(site: &mut Site, unit: u8, request: Request<'_>) -> Answer {
-    match site.device.answer(unit, &request) {
-        None => Answer::Silence,
-        Some(Response::ReadHoldingRegisters(registers)) => Answer::Registers(registers.len()),
-        Some(Response::Exception { function, code: ExceptionCode(code) }) => {
-            assert_eq!(function, request.function());
-            Answer::Exception(code)
-        }
-        Some(response) => {
-            response.answers(&request).unwrap();
-            Answer::Echo
-        }
-    }
 }
 
 #[test]

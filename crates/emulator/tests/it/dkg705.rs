@@ -3,10 +3,10 @@
 mod registers;
 
 use busbar_emulator::{Config, StartError};
-use busbar_modbus::{ExceptionCode, Registers, Request, Response};
+use busbar_modbus::{Registers, Request, Response};
 use proptest::prelude::*;
 
-use crate::site::{Site, TENTH};
+use crate::site::{Answer, Site, TENTH, ask};
 
 const MODE_KEYS: u16 = 0x0040;
 const AUTO: u16 = 0x10;
@@ -33,29 +33,6 @@ fn clock(site: &Site) -> [u16; 6] {
 }
 
 // The wire.
-
-#[derive(Debug, PartialEq)]
-enum Answer {
-    Registers(usize),
-    Echo,
-    Exception(u8),
-    Silence,
-}
-
-fn ask(site: &mut Site, unit: u8, request: Request<'_>) -> Answer {
-    match site.device.answer(unit, &request) {
-        None => Answer::Silence,
-        Some(Response::ReadHoldingRegisters(registers)) => Answer::Registers(registers.len()),
-        Some(Response::Exception { function, code: ExceptionCode(code) }) => {
-            assert_eq!(function, request.function());
-            Answer::Exception(code)
-        }
-        Some(response) => {
-            response.answers(&request).unwrap();
-            Answer::Echo
-        }
-    }
-}
 
 fn read(address: u16, count: u16) -> Request<'static> {
     Request::ReadHoldingRegisters { address, count }

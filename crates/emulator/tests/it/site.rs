@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use busbar_emulator::{Config, Device};
-use busbar_modbus::{Request, Response};
+use busbar_modbus::{ExceptionCode, Request, Response};
 use busbar_profile::{BitSet, Decoded, Number, Value};
 
 pub(crate) const PUSH_BUTTONS: u16 = 8193;
@@ -115,5 +115,30 @@ impl Site {
             .flat_map(|&(first, last)| self.device.registers(first, last - first + 1).unwrap())
             .copied()
             .collect()
+    }
+}
+
+/// What came of a request.
+#[derive(Debug, PartialEq)]
+pub(crate) enum Answer {
+    Registers(usize),
+    Echo,
+    Exception(u8),
+    Silence,
+}
+
+/// Asks the device itself, without a wire.
+pub(crate) fn ask(site: &mut Site, unit: u8, request: Request<'_>) -> Answer {
+    match site.device.answer(unit, &request) {
+        None => Answer::Silence,
+        Some(Response::ReadHoldingRegisters(registers)) => Answer::Registers(registers.len()),
+        Some(Response::Exception { function, code: ExceptionCode(code) }) => {
+            assert_eq!(function, request.function());
+            Answer::Exception(code)
+        }
+        Some(response) => {
+            response.answers(&request).unwrap();
+            Answer::Echo
+        }
     }
 }

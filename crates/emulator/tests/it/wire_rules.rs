@@ -1,32 +1,9 @@
 //! The wire rules of the D-series manual, request by request.
 
 use busbar_emulator::Config;
-use busbar_modbus::{ExceptionCode, Registers, Request, Response};
+use busbar_modbus::{Registers, Request};
 
-use crate::site::{CHANNEL_SELECT, HARD_RESET, PUSH_BUTTONS, Site};
-
-#[derive(Debug, PartialEq)]
-enum Answer {
-    Registers(usize),
-    Echo,
-    Exception(u8),
-    Silence,
-}
-
-fn ask(site: &mut Site, unit: u8, request: Request<'_>) -> Answer {
-    match site.device.answer(unit, &request) {
-        None => Answer::Silence,
-        Some(Response::ReadHoldingRegisters(registers)) => Answer::Registers(registers.len()),
-        Some(Response::Exception { function, code: ExceptionCode(code) }) => {
-            assert_eq!(function, request.function());
-            Answer::Exception(code)
-        }
-        Some(response) => {
-            response.answers(&request).unwrap();
-            Answer::Echo
-        }
-    }
-}
+use crate::site::{Answer, CHANNEL_SELECT, HARD_RESET, PUSH_BUTTONS, Site, ask};
 
 fn read(address: u16, count: u16) -> Request<'static> {
     Request::ReadHoldingRegisters { address, count }

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use busbar_emulator::{Config, Device, StartError};
-use busbar_modbus::{Bits, ExceptionCode, Framing, Registers, Request, Response, Server};
+use busbar_modbus::{Bits, Framing, Registers, Request, Server};
 use proptest::prelude::*;
 
 use super::{ON, bit, config, quiet};
-use crate::site::Site;
+use crate::site::{Answer, Site, ask};
 
 /// What a request frame is answered with on a serial line.
 fn exchange(site: &mut Site, frame: &[u8]) -> Vec<u8> {
@@ -45,29 +45,6 @@ fn the_worked_frames() {
         assert_eq!(exchange(&mut site, &request), answer, "{request:02X?}");
     }
     assert!(bit(&site, "common_status", 8), "500.8 confirms the automatic mode");
-}
-
-#[derive(Debug, PartialEq)]
-enum Answer {
-    Registers(usize),
-    Echo,
-    Exception(u8),
-    Silence,
-}
-
-fn ask(site: &mut Site, unit: u8, request: Request<'_>) -> Answer {
-    match site.device.answer(unit, &request) {
-        None => Answer::Silence,
-        Some(Response::ReadHoldingRegisters(registers)) => Answer::Registers(registers.len()),
-        Some(Response::Exception { function, code: ExceptionCode(code) }) => {
-            assert_eq!(function, request.function());
-            Answer::Exception(code)
-        }
-        Some(response) => {
-            response.answers(&request).unwrap();
-            Answer::Echo
-        }
-    }
 }
 
 #[test]
