@@ -75,5 +75,6 @@ async fn a_device_that_was_pulled_out_is_used_again_when_it_is_back() {
     let slave = line.play(answer(8));
     assert_eq!(read(&link).await, Ok(vec![8]));
     assert_eq!(link.statistics().reconnects, 1);
+    drop(link);
     slave.join().unwrap();
 }

@@ -36,6 +36,7 @@ async fn reads_and_writes() {
     let refused = read(&link).await.unwrap_err();
     assert!(matches!(refused, LinkError::Exception { unit: UNIT, function: 3, .. }), "{refused}");
     assert_eq!(link.statistics().echoes, 0);
+    drop(link);
     slave.join().unwrap();
 }
 
@@ -65,6 +66,7 @@ async fn the_line_is_silent_before_each_request() {
     for _ in 0..ROUNDS {
         assert_eq!(read(&link).await, Ok(vec![7]));
     }
+    drop(link);
     slave.join().unwrap();
 }
 
@@ -126,6 +128,7 @@ async fn an_adapter_may_echo() {
     assert_eq!(read(&link).await, Ok(vec![8]));
     let seen = link.statistics();
     assert_eq!((seen.echoes, seen.garbage_bytes, seen.late), (4, 0, 0));
+    drop(link);
     slave.join().unwrap();
 }
 
@@ -154,6 +157,7 @@ async fn an_echo_behind_noise_confirms_no_write() {
     let refused = link.write(UNIT, set(6)).await;
     assert!(matches!(refused, Err(LinkError::Exception { .. })), "{refused:?}");
     assert_eq!(link.statistics().echoes, 4);
+    drop(link);
     slave.join().unwrap();
 }
 
@@ -169,6 +173,7 @@ async fn an_echo_alone_is_named() {
     let silent = read(&link).await.unwrap_err();
     assert!(matches!(silent, LinkError::Timeout { heard: Heard::Echo, .. }), "{silent}");
     assert!(silent.to_string().contains("the adapter echoes"), "{silent}");
+    drop(link);
     slave.join().unwrap();
 }
 
@@ -190,8 +195,8 @@ async fn frames_are_shown_whole() {
     let link = Link::open(endpoint, Options { trace: Some(trace), ..options() }).unwrap();
     let mut state = link.state();
     assert_eq!(read(&link).await, Ok(vec![7]));
-    slave.join().unwrap();
     drop(link);
+    slave.join().unwrap();
     // The task has ended, and shown everything.
     while state.changed().await.is_ok() {}
     let request = frame(&[1, 3, 0x28, 0x06, 0, 1]);

@@ -6,8 +6,8 @@ use busbar_link::{Heard, Link, LinkError, Options, Write};
 
 use crate::slave::*;
 
-/// What is heard when a slave says this, and nothing else, to a read.
-async fn heard(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (Heard, Link) {
+/// What is heard when a slave says this, and nothing else, to a read; and how many check sums were wrong.
+async fn heard(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (Heard, u64) {
     let line = Line::new();
     let endpoint = line.endpoint();
     let slave = line.play(move |line| {
@@ -17,9 +17,11 @@ async fn heard(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> (Heard, Li
     });
     let link = connected(endpoint, quick()).await;
     let error = read(&link).await.unwrap_err();
-    slave.join().unwrap();
     let LinkError::Timeout { heard, .. } = error else { panic!("{error}") };
-    (heard, link)
+    let crc_errors = link.statistics().crc_errors;
+    drop(link);
+    slave.join().unwrap();
+    (heard, crc_errors)
 }
 
 #[tokio::test]
@@ -42,6 +44,7 @@ async fn noise_before_an_answer_does_not_hide_it() {
     }
     let seen = link.statistics();
     assert_eq!((seen.late, seen.garbage_bytes), (1, 3));
+    drop(link);
     slave.join().unwrap();
 }
 
@@ -65,6 +68,7 @@ async fn an_answer_behind_noise_does_not_wait_for_the_deadline() {
         tokio::time::sleep(Duration::from_millis(100)).await;
         assert_eq!(tokio::time::timeout(soon, read(&link)).await, Ok(Ok(vec![value])));
     }
+    drop(link);
     slave.join().unwrap();
 }
 
@@ -104,6 +108,7 @@ async fn a_line_that_is_never_silent_is_named_and_soon() {
     let patient = link.with_timeout(Duration::from_secs(30));
     assert_eq!(read(&patient).await, Ok(vec![7]));
     assert_eq!(patient.write(UNIT, Write::Register { address: 8193, value: 4 }).await, Ok(()));
+    drop(link);
     slave.join().unwrap();
 }
 
@@ -115,14 +120,14 @@ async fn what_is_heard_instead_of_an_answer_has_a_name() {
     let (named, _) = heard(|request| register(request, 7)[..4].to_vec()).await;
     assert_eq!(named, Heard::Noise { bytes: 4 }, "a truncated frame");
 
-    let (named, link) = heard(|request| {
+    let (named, crc_errors) = heard(|request| {
         let mut damaged = register(request, 7);
         damaged[3] ^= 0x10;
         damaged
     })
     .await;
     assert_eq!(named, Heard::BadCrc);
-    assert_eq!(link.statistics().crc_errors, 1);
+    assert_eq!(crc_errors, 1);
 
     let (named, _) = heard(|_| frame(&[2, 3, 2, 0, 7])).await;
     assert_eq!(named, Heard::OtherUnit);
@@ -149,6 +154,7 @@ async fn noise_inside_a_frame_costs_a_try_and_no_value() {
     let link = Link::open(endpoint, options()).unwrap();
     assert_eq!(read(&link.with_timeout(QUICK)).await, Ok(vec![8]));
     assert_eq!(link.statistics().retries, 1);
+    drop(link);
     slave.join().unwrap();
 }
 
@@ -174,5 +180,6 @@ async fn a_late_answer_is_counted_and_not_taken() {
     }
     let second = link.with_timeout(Duration::from_secs(30));
     assert_eq!(second.read_registers(UNIT, 3, ADDRESS + 1, 1).await, Ok(vec![7]));
+    drop(link);
     slave.join().unwrap();
 }

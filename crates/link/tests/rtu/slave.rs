@@ -70,7 +70,8 @@ impl Line {
         at
     }
 
-    /// Runs a slave on this line beside the client. It hands the line back, for nothing may vanish early.
+    /// Runs a slave on this line beside the client. It hands the line back, for nothing may vanish early. The client ends
+    /// first: it would look for its device again, and the system gives the same path to the next line.
     pub(crate) fn play(self, slave: impl FnOnce(&mut Self) + Send + 'static) -> JoinHandle<Self> {
         std::thread::spawn(move || {
             let mut line = self;
