@@ -1,10 +1,11 @@
 //! A device under test: simulated time, and values read the way a client reads them.
 
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use busbar_emulator::{Config, Device};
 use busbar_modbus::{ExceptionCode, Request, Response};
-use busbar_profile::{BitSet, Decoded, Number, Value};
+use busbar_profile::{BitSet, Decoded, Number, Point, Quality, Value};
 
 pub(crate) const PUSH_BUTTONS: u16 = 8193;
 pub(crate) const CHANNEL_SELECT: u16 = 8194;
@@ -140,5 +141,30 @@ pub(crate) fn ask(site: &mut Site, unit: u8, request: Request<'_>) -> Answer {
             response.answers(&request).unwrap();
             Answer::Echo
         }
+    }
+}
+
+/// Whether a person at the site would take this for the value of a number, a choice or a set of bits.
+///
+/// `plausible` gives the range of a number, and is asked for nothing else.
+pub(crate) fn believe(
+    point: &Point,
+    decoded: Decoded,
+    plausible: fn(&Point) -> RangeInclusive<f64>,
+    situation: &str,
+) {
+    assert_eq!(decoded.quality, Quality::Good, "{situation}: {}", point.id);
+    match decoded.value {
+        Some(Value::Number(number)) => {
+            let (value, range) = (number.as_f64(), plausible(point));
+            assert!(range.contains(&value), "{situation}: {} = {value}, not in {range:?}", point.id);
+        }
+        Some(Value::Choice { code }) => {
+            assert!(point.choice(code).is_some(), "{situation}: {} = {code}", point.id);
+        }
+        Some(Value::Bits(bits)) => {
+            assert!(bits.iter().all(|bit| point.bit(bit).is_some()), "{situation}: {}", point.id);
+        }
+        other => panic!("{situation}: {} is {other:?}", point.id),
     }
 }

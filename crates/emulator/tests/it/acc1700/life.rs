@@ -12,7 +12,7 @@ use super::{
     LOAD_UNLOAD, START, STOP, command, common, config, indicator, loaded, pinned, press, quiet, status,
     walk_to,
 };
-use crate::site::{Site, TENTH};
+use crate::site::{Site, TENTH, believe};
 
 /// Not fitted to the demonstration unit.
 const ABSENT: [&str; 2] = ["sensor_1_value", "coolant_pressure"];
@@ -68,20 +68,7 @@ fn judge(site: &Site, situation: &str) {
             assert_eq!(site.device.registers(point.address, 1), Some(&[32766][..]));
             continue;
         }
-        assert_eq!(decoded.quality, Quality::Good, "{situation}: {}", point.id);
-        match decoded.value {
-            Some(Value::Number(number)) => {
-                let range = plausible(point);
-                assert!(range.contains(&number.as_f64()), "{situation}: {} = {number}", point.id);
-            }
-            Some(Value::Choice { code }) => {
-                assert!(point.choice(code).is_some(), "{situation}: {} = {code}", point.id);
-            }
-            Some(Value::Bits(bits)) => {
-                assert!(bits.iter().all(|bit| point.bit(bit).is_some()), "{situation}: {}", point.id);
-            }
-            other => panic!("{situation}: {} is {other:?}", point.id),
-        }
+        believe(point, decoded, plausible, situation);
     }
 }
 

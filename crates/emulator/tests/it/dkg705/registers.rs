@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 use busbar_emulator::Config;
-use busbar_profile::{Point, Quality, Value};
+use busbar_profile::{Point, Value};
 use proptest::prelude::*;
 
 use super::{AUTO, LOAD_TEST, MODE_KEYS, OFF, TEST, config, quiet, story};
-use crate::site::{Site, TENTH};
+use crate::site::{Site, TENTH, believe};
 
 const STORY_SECONDS: u64 = 330;
 
@@ -33,24 +33,9 @@ fn every_point_is_good_and_plausible_in_every_status() {
 }
 
 fn judge(site: &Site) {
-    let status = site.code("operation_status");
+    let situation = format!("status {}", site.code("operation_status"));
     for point in site.device.profile().points.iter().filter(|point| point.access.is_readable()) {
-        let decoded = site.decode(&point.id);
-        assert_eq!(decoded.quality, Quality::Good, "status {status}: {}", point.id);
-        match decoded.value {
-            Some(Value::Number(number)) => {
-                let range = plausible(point);
-                let value = number.as_f64();
-                assert!(range.contains(&value), "status {status}: {} = {value}, not in {range:?}", point.id);
-            }
-            Some(Value::Choice { code }) => {
-                assert!(point.choice(code).is_some(), "status {status}: {} = {code}", point.id);
-            }
-            Some(Value::Bits(bits)) => {
-                assert!(bits.iter().all(|bit| point.bit(bit).is_some()), "status {status}: {}", point.id);
-            }
-            other => panic!("status {status}: {} is {other:?}", point.id),
-        }
+        believe(point, site.decode(&point.id), plausible, &situation);
     }
 }
 

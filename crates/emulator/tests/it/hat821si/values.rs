@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 
-use busbar_profile::{DataType, Point, Quality, Value};
+use busbar_profile::{DataType, Point, Quality};
 
 use super::{bit, positions, quiet, send, set, with_story};
-use crate::site::{Site, TENTH};
+use crate::site::{Site, TENTH, believe};
 
 #[test]
 fn power_on_finds_two_sources_on_their_own_sections() {
@@ -59,21 +59,7 @@ fn judge(site: &Site, situation: &str) {
             assert!(site.number(&volts) < 700.0, "{situation}: {}", point.id);
             continue;
         }
-        assert_eq!(decoded.quality, Quality::Good, "{situation}: {}", point.id);
-        match decoded.value {
-            Some(Value::Number(number)) => {
-                let range = plausible(point);
-                let value = number.as_f64();
-                assert!(range.contains(&value), "{situation}: {} = {value}, not in {range:?}", point.id);
-            }
-            Some(Value::Choice { code }) => {
-                assert!(point.choice(code).is_some(), "{situation}: {} = {code}", point.id);
-            }
-            Some(Value::Bits(bits)) => {
-                assert!(bits.iter().all(|bit| point.bit(bit).is_some()), "{situation}: {}", point.id);
-            }
-            other => panic!("{situation}: {} is {other:?}", point.id),
-        }
+        believe(point, decoded, plausible, situation);
     }
 }
 
