@@ -204,7 +204,8 @@ fn states_agree(site: &Site, place: &str) {
     match status {
         0 | 1 | 2 | 15 => assert_eq!(rpm, 0.0, "{place}: status {status}"),
         9 => assert!(rpm > 850.0, "{place}: {rpm}"),
-        8 => assert!((850.0..=1520.0).contains(&rpm), "{place}: {rpm}"),
+        // A load that is thrown off lets the governor overshoot.
+        8 => assert!((850.0..=1560.0).contains(&rpm), "{place}: {rpm}"),
         _ if running => assert!(rpm > 380.0, "{place}: status {status}, {rpm}"),
         _ => {}
     }
