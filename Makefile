@@ -49,6 +49,8 @@ test-web: web
 	$(NPM) run size
 	$(NPM) test
 
+# Properties are tried with the same cases every time; run cargo test without this for cases of the day.
+test-rust: export PROPTEST_RNG_SEED := 1
 test-rust: web
 	$(CARGO) test --locked --workspace
 
