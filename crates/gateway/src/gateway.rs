@@ -95,7 +95,8 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
         tasks.spawn(Poller::new(Arc::clone(&hub), index, device.clone(), wire).run());
     }
     tasks.spawn(age(Arc::clone(&hub)));
-    tasks.spawn(server::serve(listener, address, hub));
+    let service = server::Service { listener, address, hosts: Vec::new(), limits: None };
+    tasks.spawn(server::serve(service, hub));
     tracing::info!(%address, devices = site.devices.len(), "gateway started");
     Ok(Gateway { address, stop, tasks })
 }

@@ -1,5 +1,6 @@
 //! The HTTP API `/api/v1` and the document that describes it.
 
+mod etag;
 mod problem;
 pub mod types;
 
@@ -15,6 +16,7 @@ use utoipa::{IntoParams, OpenApi};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+pub(crate) use self::etag::tagged;
 pub use self::problem::Problem;
 use self::types::{
     AlarmView, AlarmsEvent, DeviceView, JoinedView, PointsView, SiteView, SnapshotEvent, ValueView,
@@ -22,6 +24,9 @@ use self::types::{
 };
 use crate::events;
 use crate::hub::Hub;
+
+/// Where the event stream is.
+pub(crate) const EVENTS: &str = "/api/v1/events";
 
 /// The OpenAPI 3.1 document of the API, as `/api/v1/openapi.json` serves it.
 pub fn openapi() -> utoipa::openapi::OpenApi {
