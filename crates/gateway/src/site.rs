@@ -30,6 +30,8 @@ pub struct Site {
     pub name: String,
     /// Where the gateway listens.
     pub listen: SocketAddr,
+    /// Host names that a gateway for this machine alone answers to besides this machine's own: those of a proxy.
+    pub hosts: Vec<String>,
     /// The wires, in the order of the file; ids are unique.
     pub wires: Vec<SiteWire>,
     /// The devices, in the order of the file; ids are unique.
@@ -53,6 +55,17 @@ pub struct SiteWire {
     pub spacing: Option<Duration>,
 }
 
+impl SiteWire {
+    /// Whether the two are one line, used in one way, so that it need not be opened anew.
+    pub(crate) fn is_same_line(&self, other: &Self) -> bool {
+        let Self { id, endpoint, timeout, spacing } = self;
+        *id == other.id
+            && *endpoint == other.endpoint
+            && *timeout == other.timeout
+            && *spacing == other.spacing
+    }
+}
+
 /// One device of a site.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -71,6 +84,19 @@ pub struct SiteDevice {
     pub word_order: WordOrder,
     /// How often it is polled.
     pub poll: Poll,
+}
+
+impl SiteDevice {
+    /// Whether the two are one device, read in one way. Which wire it is on is not looked at.
+    pub(crate) fn is_same_device(&self, other: &Self) -> bool {
+        let Self { id, name, profile, wire: _, unit, word_order, poll } = self;
+        *id == other.id
+            && *name == other.name
+            && std::ptr::eq(*profile, other.profile)
+            && *unit == other.unit
+            && *word_order == other.word_order
+            && *poll == other.poll
+    }
 }
 
 /// How often a device is polled.
@@ -148,6 +174,7 @@ fn read(root: &Table<'_, '_>, findings: &mut Collector<'_>, warnings: &mut Colle
     Site {
         name: name.unwrap_or_default(),
         listen,
+        hosts: Vec::new(),
         wires: wires.into_iter().filter_map(|wire| wire.wire).collect(),
         devices: devices.into_iter().map(|placed| placed.device).collect(),
         warnings: Vec::new(),

@@ -1,6 +1,7 @@
 //! The HTTP API `/api/v1` and the document that describes it.
 
 mod etag;
+mod operation;
 mod problem;
 pub mod types;
 
@@ -33,7 +34,7 @@ pub fn openapi() -> utoipa::openapi::OpenApi {
     routes().into_openapi()
 }
 
-/// Every route of the API, `/healthz` included.
+/// Every route of the API, with those for whoever keeps the gateway running.
 pub(crate) fn router(hub: Arc<Hub>) -> Router {
     Router::from(routes()).with_state(hub)
 }
@@ -51,7 +52,9 @@ fn routes() -> OpenApiRouter<Arc<Hub>> {
         .routes(routes!(wire))
         .routes(routes!(stream))
         .routes(routes!(document))
-        .routes(routes!(healthz))
+        .routes(routes!(operation::healthz))
+        .routes(routes!(operation::readyz))
+        .routes(routes!(operation::metrics))
 }
 
 #[derive(OpenApi)]
@@ -63,7 +66,7 @@ fn routes() -> OpenApiRouter<Arc<Hub>> {
     ),
     // The events are not a body that the document could describe, so their shapes are named here.
     components(schemas(SnapshotEvent, ValuesEvent, AlarmsEvent, Problem)),
-    tags((name = "site", description = "The site, its devices and its wires"), (name = "live", description = "What they read now")),
+    tags((name = "site", description = "The site, its devices and its wires"), (name = "live", description = "What they read now"), (name = "operation", description = "For whoever keeps the gateway running")),
 )]
 struct Document;
 
@@ -237,7 +240,7 @@ async fn stream(
     query: Result<Query<EventsQuery>, QueryRejection>,
 ) -> Result<Response, Problem> {
     let Query(query) = query.map_err(bad_query)?;
-    let only = query.device.map(|device| hub.index(&device)).transpose()?;
+    let only = query.device.map(|device| hub.device(&device)).transpose()?.map(|slot| slot.key);
     Ok(events::response(hub, only))
 }
 
@@ -249,15 +252,6 @@ async fn stream(
 async fn document() -> Response {
     static DOCUMENT: LazyLock<Vec<u8>> = LazyLock::new(|| serde_json::to_vec(&openapi()).unwrap_or_default());
     ([(header::CONTENT_TYPE, "application/json")], DOCUMENT.as_slice()).into_response()
-}
-
-/// Whether the gateway runs.
-#[utoipa::path(
-    get, path = "/healthz", tag = "site",
-    responses((status = OK, body = String, content_type = "text/plain", description = "It runs", example = "ok")),
-)]
-async fn healthz() -> &'static str {
-    "ok\n"
 }
 
 /// The id of a device in a path.

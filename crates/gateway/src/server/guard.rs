@@ -18,6 +18,7 @@ use tower_http::set_header::SetResponseHeaderLayer;
 use super::held::{Pieces, holding};
 use super::limits::Limits;
 use crate::api::{EVENTS, Problem};
+use crate::hub::Hub;
 
 /// Nothing but our own files is loaded, and no other page may show ours.
 const POLICY: &str = "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; \
@@ -31,8 +32,8 @@ const LONGEST_ADDRESS: usize = 8 * 1_024;
 pub(crate) struct Known {
     /// Where it listens.
     pub(crate) address: IpAddr,
-    /// The names that a proxy on this machine may ask for.
-    pub(crate) hosts: Vec<String>,
+    /// Knows the names that a proxy on this machine may ask for.
+    pub(crate) hub: Arc<Hub>,
 }
 
 /// Routes behind everything that guards them and speaks for what they do not know.
@@ -41,7 +42,7 @@ pub(crate) fn guarded(routes: Router, known: Known) -> Router {
         .fallback(nothing_here)
         .method_not_allowed_fallback(wrong_method)
         .layer(CatchPanicLayer::custom(panicked))
-        .layer(from_fn_with_state(Arc::new(known), known_host))
+        .layer(from_fn_with_state(known, known_host))
         .layer(from_fn(short_address))
         .layer(map_response(in_a_sentence))
         .layer(header_unless_set(header::CONTENT_SECURITY_POLICY, POLICY))
@@ -102,7 +103,7 @@ async fn short_address(request: Request, next: Next) -> Response {
 
 /// A gateway for this machine alone answers to no other name than it was told: a page elsewhere could have its own
 /// name point here (DNS rebinding) and read along.
-async fn known_host(State(known): State<Arc<Known>>, request: Request, next: Next) -> Response {
+async fn known_host(State(known): State<Known>, request: Request, next: Next) -> Response {
     let host = host(&request);
     if host.is_none() && request.version() == Version::HTTP_11 {
         let detail = "the request has no Host header, or more than one, or one that names no host; send one";
@@ -126,7 +127,7 @@ async fn known_host(State(known): State<Arc<Known>>, request: Request, next: Nex
 
 impl Known {
     fn answers_to(&self, host: &str) -> bool {
-        self.hosts.iter().any(|known| known.eq_ignore_ascii_case(host))
+        self.hub.table().hosts.iter().any(|known| known.eq_ignore_ascii_case(host))
     }
 }
 
@@ -196,6 +197,7 @@ mod tests {
     use tower::ServiceExt;
 
     use super::*;
+    use crate::table::Table;
 
     fn asked(uri: &str, host: Option<&str>) -> Option<String> {
         let mut request = Request::builder().uri(uri);
@@ -223,7 +225,10 @@ mod tests {
 
     async fn get(routes: Router, address: &str, host: &str) -> Response {
         let request = Request::builder().uri("/").header(header::HOST, host).body(Body::empty()).unwrap();
-        let known = Known { address: address.parse().unwrap(), hosts: vec!["power.example.org".to_owned()] };
+        let hosts = vec!["power.example.org".to_owned()];
+        let table = Table { hosts, ..crate::testing::table(&[]) };
+        let hub = Arc::new(Hub::new(table, crate::stop::channel().1));
+        let known = Known { address: address.parse().unwrap(), hub };
         guarded(routes, known).oneshot(request).await.unwrap()
     }
 

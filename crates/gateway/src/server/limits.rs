@@ -3,18 +3,18 @@
 use std::time::Duration;
 
 /// What one client, and all of them together, may ask of the server.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Limits {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
     /// Connections at a time. At this bound the one that has been idle longest makes room for the next.
-    pub(crate) connections: usize,
+    pub connections: usize,
     /// Readers of the event stream among them.
-    pub(crate) streams: usize,
+    pub streams: usize,
     /// KiB of answers that are ready and wait for their readers, all together.
-    pub(crate) waiting_kib: usize,
+    pub waiting_kib: usize,
     /// A client has this long to send the head of a request, and a connection may be idle for as long.
-    pub(crate) head: Duration,
+    pub head: Duration,
     /// A reader that takes nothing for so long is gone, whatever its connection says.
-    pub(crate) write: Duration,
+    pub write: Duration,
 }
 
 impl Limits {

@@ -22,7 +22,7 @@ use tokio::time::{Instant, sleep, timeout};
 use tower_http::compression::CompressionLayer;
 
 use self::guard::{Known, header_unless_set};
-pub(crate) use self::limits::Limits;
+pub use self::limits::Limits;
 use self::places::{Activity, Places};
 use crate::api;
 use crate::hub::Hub;
@@ -44,18 +44,16 @@ const CROWDED: Duration = Duration::from_millis(100);
 pub(crate) struct Service {
     pub(crate) listener: TcpListener,
     pub(crate) address: SocketAddr,
-    /// Names besides those of this machine under which a gateway for this machine alone is asked, by a proxy.
-    pub(crate) hosts: Vec<String>,
     /// None: those of this process.
     pub(crate) limits: Option<Limits>,
 }
 
 /// Serves until the gateway ends.
 pub(crate) async fn serve(service: Service, hub: Arc<Hub>) {
-    let wires = hub.wires().len();
+    let wires = hub.table().wires.len();
     let limits = service.limits.unwrap_or_else(|| Limits::with_handles(limits::handles(), wires));
     let stop = hub.stop();
-    let known = Known { address: service.address.ip(), hosts: service.hosts };
+    let known = Known { address: service.address.ip(), hub: Arc::clone(&hub) };
     accept(service.listener, router(hub, known, &limits), limits, stop).await;
 }
 
@@ -167,7 +165,7 @@ mod tests {
         let address = listener.local_addr().unwrap();
         let hub = Arc::new(crate::testing::hub(&[], stop));
         let limits = Limits { connections: 3, ..Limits::default() };
-        let service = Service { listener, address, hosts: Vec::new(), limits: Some(limits) };
+        let service = Service { listener, address, limits: Some(limits) };
         let server = tokio::spawn(serve(service, hub));
         let mut first = ask(address).await;
         let mut second = ask(address).await;
