@@ -1,5 +1,6 @@
 //! The HTTP API `/api/v1` and the document that describes it.
 
+mod common;
 mod etag;
 mod operation;
 mod problem;
@@ -29,9 +30,14 @@ use crate::hub::Hub;
 /// Where the event stream is.
 pub(crate) const EVENTS: &str = "/api/v1/events";
 
+/// What changes with a restart or another site file only may be kept, as long as its tag is asked for each time.
+const KEPT: [(header::HeaderName, &str); 1] = [(header::CACHE_CONTROL, "no-cache")];
+
 /// The OpenAPI 3.1 document of the API, as `/api/v1/openapi.json` serves it.
 pub fn openapi() -> utoipa::openapi::OpenApi {
-    routes().into_openapi()
+    let mut document = routes().into_openapi();
+    common::describe(&mut document);
+    document
 }
 
 /// Every route of the API, with those for whoever keeps the gateway running.
@@ -123,9 +129,9 @@ async fn points(
     State(hub): State<Arc<Hub>>,
     device: Result<Path<String>, PathRejection>,
     query: Result<Query<PointsQuery>, QueryRejection>,
-) -> Result<Json<PointsView>, Problem> {
+) -> Result<Response, Problem> {
     let Query(query) = query.map_err(bad_query)?;
-    hub.points(&known(device)?, &query).map(Json)
+    hub.points(&known(device)?, &query).map(|points| (KEPT, Json(points)).into_response())
 }
 
 /// Which values of a device are wanted.
@@ -251,7 +257,7 @@ async fn stream(
 )]
 async fn document() -> Response {
     static DOCUMENT: LazyLock<Vec<u8>> = LazyLock::new(|| serde_json::to_vec(&openapi()).unwrap_or_default());
-    ([(header::CONTENT_TYPE, "application/json")], DOCUMENT.as_slice()).into_response()
+    (KEPT, [(header::CONTENT_TYPE, "application/json")], DOCUMENT.as_slice()).into_response()
 }
 
 /// The id of a device in a path.

@@ -22,8 +22,10 @@ use crate::metrics;
 )]
 pub(super) async fn healthz(State(hub): State<Arc<Hub>>) -> Result<&'static str, Problem> {
     let Some(since) = hub.health().hangs(hub.now()) else { return Ok("ok\n") };
-    let detail =
-        format!("the age of values has not been looked at for {} s; start the gateway again", since.as_secs());
+    let detail = format!(
+        "the age of values has not been looked at for {} s; start the gateway again",
+        since.as_secs()
+    );
     Err(Problem::new(StatusCode::SERVICE_UNAVAILABLE, detail))
 }
 

@@ -53,7 +53,12 @@ pub(super) fn encode(devices: &[DeviceSample], out: &mut Out<'_>) -> fmt::Result
     let met = devices.iter().filter_map(|device| {
         Some((device.id(), u64::from(device.view.desired.as_ref().and_then(|desired| desired.met)?)))
     });
-    out.gauges("device_mode_desired", "Whether the device is in the mode that the site file wants", None, met)?;
+    out.gauges(
+        "device_mode_desired",
+        "Whether the device is in the mode that the site file wants",
+        None,
+        met,
+    )?;
     let readable = devices.iter().map(|device| (device.id(), u64::from(device.view.alarms_fault.is_none())));
     out.gauges("device_alarms_known", "Whether all alarms of the device are read well", None, readable)?;
     let alarms = devices.iter().filter(|device| device.view.alarms_fault.is_none()).flat_map(|device| {

@@ -35,7 +35,9 @@ const OF_A_WIRE: [Counter<Statistics>; 17] = [
     ("wire_retries", "Reads that were sent once more", |counted| counted.retries),
     ("wire_late", "Answers that came after their time was up", |counted| counted.late),
     ("wire_wrong_unit", "Answers from another unit than the one asked", |counted| counted.wrong_unit),
-    ("wire_wrong_function", "Answers with another function than the request", |counted| counted.wrong_function),
+    ("wire_wrong_function", "Answers with another function than the request", |counted| {
+        counted.wrong_function
+    }),
     ("wire_wrong_length", "Answers with more or less data than asked for", |counted| counted.wrong_length),
     ("wire_wrong_echo", "Confirmations of another write than was sent", |counted| counted.wrong_echo),
     ("wire_wrong_protocol", "Frames of another protocol than Modbus", |counted| counted.wrong_protocol),
@@ -55,7 +57,9 @@ const OF_A_UNIT: [Counter<UnitStatistics>; 10] = [
     ("unit_retries", "Reads that were sent to the unit once more", |counted| counted.retries),
     ("unit_held", "Polls held back while the unit was silent", |counted| counted.held),
     ("unit_late", "Answers of the unit after their time was up", |counted| counted.late),
-    ("unit_crc_errors", "Frames with a wrong checksum while its answer was due", |counted| counted.crc_errors),
+    ("unit_crc_errors", "Frames with a wrong checksum while its answer was due", |counted| {
+        counted.crc_errors
+    }),
     ("unit_garbage_bytes", "Bytes of no frame while its answer was due", |counted| counted.garbage_bytes),
     ("unit_received_bytes", "Bytes received while its answer was due", |counted| counted.bytes_received),
     ("unit_sent_bytes", "Bytes sent to the unit", |counted| counted.bytes_sent),
@@ -69,7 +73,8 @@ pub(super) fn encode(wires: &[WireSample], out: &mut Out<'_>) -> fmt::Result {
     }
     out.latencies(wires)?;
     let exceptions = wires.iter().flat_map(|wire| {
-        by_code(&wire.counted.exceptions).map(|(code, count)| ([("wire", wire.id.clone()), ("code", code)], count))
+        by_code(&wire.counted.exceptions)
+            .map(|(code, count)| ([("wire", wire.id.clone()), ("code", code)], count))
     });
     out.counters("wire_exceptions", "Exceptions by code", exceptions)?;
 
@@ -96,9 +101,9 @@ fn by_code(counted: &BTreeMap<u8, u64>) -> impl Iterator<Item = (String, u64)> +
     for (code, count) in counted {
         *known.entry(Some(*code).filter(|code| matches!(code, 1..=8 | 10 | 11))).or_default() += count;
     }
-    known.into_iter().map(|(code, count)| {
-        (code.map_or_else(|| "other".to_owned(), |code| code.to_string()), count)
-    })
+    known
+        .into_iter()
+        .map(|(code, count)| (code.map_or_else(|| "other".to_owned(), |code| code.to_string()), count))
 }
 
 impl Out<'_> {
@@ -109,14 +114,21 @@ impl Out<'_> {
 
         let answered = wires.iter().map(|wire| (wire.label(), &wire.counted.latency));
         let unit = Some("seconds");
-        self.family("wire_latency", "Time from request to answer", unit, MetricType::Histogram, answered, |out, took| {
-            let sum = took.total().as_secs_f64();
-            let buckets: Vec<(f64, u64)> = took
-                .histogram()
-                .map(|(bound, count)| (bound.map_or(f64::MAX, |bound| bound.as_secs_f64()), count))
-                .collect();
-            out.encode_histogram::<NoLabelSet>(sum, took.count(), &buckets, None)
-        })
+        self.family(
+            "wire_latency",
+            "Time from request to answer",
+            unit,
+            MetricType::Histogram,
+            answered,
+            |out, took| {
+                let sum = took.total().as_secs_f64();
+                let buckets: Vec<(f64, u64)> = took
+                    .histogram()
+                    .map(|(bound, count)| (bound.map_or(f64::MAX, |bound| bound.as_secs_f64()), count))
+                    .collect();
+                out.encode_histogram::<NoLabelSet>(sum, took.count(), &buckets, None)
+            },
+        )
     }
 }
 
