@@ -61,6 +61,8 @@ async fn accept(listener: TcpListener, router: Router, limits: Limits, stop: Sto
     let origin = Instant::now();
     let (mut connections, mut places) = (JoinSet::new(), Places::default());
     let mut ended = stop.clone();
+    // Several at a time, for finding them means looking at all of them.
+    let some = (limits.connections / 64).max(1);
     loop {
         let crowded = connections.len() >= limits.connections;
         tokio::select! {
@@ -75,17 +77,17 @@ async fn accept(listener: TcpListener, router: Router, limits: Limits, stop: Sto
                     let connection = connection(stream, router.clone(), limits, Arc::clone(&activity), stop.clone());
                     places.take(connections.spawn(connection), activity);
                     if connections.len() >= limits.connections {
-                        places.make_room();
+                        places.make_room(some);
                     }
                 }
                 Err(error) => {
                     // Out of file handles, most likely: it passes, and trying at once would only burn the processor.
                     tracing::warn!(%error, "cannot accept a connection");
-                    places.make_room();
+                    places.make_room(some);
                     sleep(CROWDED).await;
                 }
             },
-            () = sleep(CROWDED), if crowded => { places.make_room(); }
+            () = sleep(CROWDED), if crowded => { places.make_room(some); }
         }
     }
     drop(listener);

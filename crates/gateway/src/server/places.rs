@@ -71,14 +71,18 @@ impl Places {
         self.taken.remove(&task);
     }
 
-    /// Cuts off the connection that has been idle longest; false when all of them are being answered.
-    pub(crate) fn make_room(&mut self) -> bool {
+    /// Cuts off the connections that have been idle longest, so many at most; how many it were.
+    pub(crate) fn make_room(&mut self, wanted: usize) -> usize {
         let idle = self.taken.iter().filter_map(|(id, (_, activity))| Some((activity.idle_since()?, *id)));
-        let Some((_, longest)) = idle.min_by_key(|(since, _)| *since) else { return false };
-        if let Some((task, _)) = self.taken.remove(&longest) {
-            task.abort();
+        let mut idle: Vec<(Duration, Id)> = idle.collect();
+        idle.sort_unstable_by_key(|(since, _)| *since);
+        idle.truncate(wanted);
+        for (_, id) in &idle {
+            if let Some((task, _)) = self.taken.remove(id) {
+                task.abort();
+            }
         }
-        true
+        idle.len()
     }
 }
 
@@ -110,12 +114,12 @@ mod tests {
         drop(activities[1].answering());
 
         for expected in [2, 3, 1] {
-            assert!(places.make_room());
+            assert_eq!(places.make_room(1), 1);
             let error = tasks.join_next().await.unwrap().unwrap_err();
             assert_eq!((error.id(), error.is_cancelled()), (ids[expected], true));
         }
-        assert!(!places.make_room(), "the only one left is being answered");
+        assert_eq!(places.make_room(1), 0, "the only one left is being answered");
         drop(answering);
-        assert!(places.make_room());
+        assert_eq!(places.make_room(9), 1);
     }
 }
