@@ -124,7 +124,7 @@ impl Out<'_> {
                 let sum = took.total().as_secs_f64();
                 let buckets: Vec<(f64, u64)> = took
                     .histogram()
-                    .map(|(bound, count)| (bound.map_or(f64::MAX, |bound| bound.as_secs_f64()), count))
+                    .map(|(bound, count)| (bound.map_or(f64::INFINITY, |bound| bound.as_secs_f64()), count))
                     .collect();
                 out.encode_histogram::<NoLabelSet>(sum, took.count(), &buckets, None)
             },

@@ -242,7 +242,7 @@ async fn it_lives_and_says_when_it_is_ready() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn it_is_not_ready_before_a_device_was_tried() {
-    // Nobody has asked it within this time: the wire waits for its answer for a minute.
+    // Its first answer is waited for for a minute, and until then nothing is known of it.
     let device = crate::support::Imitation::start().await;
     device.change(|device| device.silent = true);
     let site = crate::support::site(&format!("tcp://{}", device.address()))
@@ -272,4 +272,22 @@ async fn numbers_are_told_as_openmetrics() {
     let refused = bench.client.get("/metrics").await.body;
     assert!(!refused.contains("busbar_genset_l1_voltage_v{"), "an exception is no number");
     assert!(refused.contains("busbar_wire_exceptions_total{wire=\"w1\",code=\"2\"} "), "{refused}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_host_of_a_proxy_can_be_named() {
+    let device = crate::support::Imitation::start().await;
+    let plain = crate::support::site(&format!("tcp://{}", device.address()));
+    let named = plain.replace("[server]", "[server]\n        hosts = [\"power.example.org\"]");
+    let (mut gateway, client) = crate::support::start(&named).await;
+    let ask = async |host: &str| client.ask("GET", "/api/v1/site", &[("host", host)]).await;
+    for host in ["power.example.org", "Power.Example.org:443", "localhost"] {
+        assert_eq!(ask(host).await.status, 200, "{host}");
+    }
+    for host in ["example.org", "evil.power.example.org", "power.example.org.evil.example"] {
+        assert!(ask(host).await.problem(421).ends_with("name the host of a proxy under [server] hosts"));
+    }
+    // It follows the site file while the gateway runs.
+    gateway.reload(busbar_gateway::Site::parse("bench.toml", &plain).unwrap()).unwrap();
+    ask("power.example.org").await.problem(421);
 }
