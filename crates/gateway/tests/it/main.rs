@@ -7,6 +7,7 @@ mod bad_line;
 mod events;
 mod faults;
 mod http;
+mod identity;
 mod live;
 mod openapi;
 mod sharing;
