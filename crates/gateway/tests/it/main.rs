@@ -10,6 +10,7 @@ mod http;
 mod identity;
 mod live;
 mod openapi;
+mod reload;
 mod sharing;
 mod start;
 mod support;
