@@ -186,6 +186,7 @@ pub(crate) fn table(devices: &[&str]) -> Table {
     Table {
         name: "Test".to_owned(),
         time_zone: None,
+        hosts: Vec::new(),
         devices: devices.iter().map(slot).collect(),
         wires: Vec::new(),
         diagram: DiagramView::default(),

@@ -505,7 +505,7 @@ impl Device {
     }
 
     /// A point's value when it can be relied on now.
-    fn good(&self, index: usize) -> Option<&busbar_profile::Value> {
+    pub(crate) fn good(&self, index: usize) -> Option<&busbar_profile::Value> {
         let point = &self.points[index];
         point.decoded.value.as_ref().filter(|_| point.quality() == Quality::Good)
     }

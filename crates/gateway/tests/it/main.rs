@@ -6,6 +6,7 @@
 mod bad_line;
 mod events;
 mod faults;
+mod hostile;
 mod http;
 mod identity;
 mod live;
