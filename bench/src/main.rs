@@ -8,6 +8,7 @@ mod fleet;
 mod peers;
 mod process;
 mod serial;
+mod soak;
 mod wire;
 
 use std::process::ExitCode;
@@ -32,6 +33,7 @@ fn main() -> ExitCode {
         ["wire", options @ ..] => wire::run(options),
         ["serial", options @ ..] => serial::run(options),
         ["fleet", options @ ..] => fleet::run(options),
+        ["soak", options @ ..] => soak::run(options),
         // How the bench starts its peers: each is a process of its own, so that its processor time is its own.
         ["peer", role @ ..] => peers::run(role),
         _ => Err(USAGE.into()),
