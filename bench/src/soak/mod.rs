@@ -39,7 +39,10 @@ async fn soak(seconds: u64, devices: usize) -> Result<(), Box<dyn Error>> {
     tokio::time::sleep(Duration::from_secs(5)).await;
     println!("{}", own());
     let mut command = Command::new(std::env::current_exe()?.with_file_name("busbar"));
-    command.args(["run", "--json", "--listen", "127.0.0.1:0", "--config"]).arg(&site).env("BUSBAR_LOG", "warn");
+    command
+        .args(["run", "--json", "--listen", "127.0.0.1:0", "--config"])
+        .arg(&site)
+        .env("BUSBAR_LOG", "warn");
     let mut gateway = Process::start(&mut command)?;
     let line = gateway.line()?;
     let page = line.split('"').find(|part| part.starts_with("http://")).unwrap();
@@ -67,7 +70,8 @@ async fn soak(seconds: u64, devices: usize) -> Result<(), Box<dyn Error>> {
     rounds.lock().unwrap().begin();
     let b = gateway.processor_time()?;
     let t = Instant::now();
-    let mut people = (0..devices.min(97)).map(|d| Person::new(fleet.endpoint(d).unwrap()).unwrap()).collect::<Vec<_>>();
+    let mut people =
+        (0..devices.min(97)).map(|d| Person::new(fleet.endpoint(d).unwrap()).unwrap()).collect::<Vec<_>>();
     let mut n = 0;
     while t.elapsed() < Duration::from_secs(seconds) {
         let d = n % people.len();
@@ -77,9 +81,21 @@ async fn soak(seconds: u64, devices: usize) -> Result<(), Box<dyn Error>> {
         n += 1;
         tokio::time::sleep(Duration::from_millis(73)).await;
     }
-    println!("with reader: {:?} in {:?}, {} MiB", gateway.processor_time()? - b, t.elapsed(), gateway.resident()? >> 20);
+    println!(
+        "with reader: {:?} in {:?}, {} MiB",
+        gateway.processor_time()? - b,
+        t.elapsed(),
+        gateway.resident()? >> 20
+    );
     let mut rounds = rounds.lock().unwrap();
-    println!("finished {} missed {} devices {} untold {} conns {}", rounds.finished, rounds.missed, rounds.devices(), rounds.untold(), fleet.connections());
+    println!(
+        "finished {} missed {} devices {} untold {} conns {}",
+        rounds.finished,
+        rounds.missed,
+        rounds.devices(),
+        rounds.untold(),
+        fleet.connections()
+    );
     println!("delay {:?} {:?} {:?}", rounds.delay(0.5), rounds.delay(0.99), rounds.delay(1.0));
     println!("{}", own());
     drop(rounds);
