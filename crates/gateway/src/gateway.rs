@@ -3,6 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use busbar_link::OpenError;
@@ -16,6 +17,7 @@ use crate::running::{Running, Unopened};
 use crate::server;
 use crate::site::Site;
 use crate::stop::{self, Announcer};
+use crate::table::Tally;
 
 /// How often values are looked at for their age.
 const AGEING: Duration = Duration::from_secs(1);
@@ -67,6 +69,7 @@ pub struct Gateway {
     tasks: JoinSet<()>,
     hub: Arc<Hub>,
     running: Running,
+    heartbeats: Arc<AtomicU64>,
 }
 
 /// Starts the gateway of a site: opens its wires, polls its devices, and serves the API and the page.
@@ -86,16 +89,28 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     let hub = Arc::new(Hub::new(running.table(&site), stopped));
     let mut tasks = JoinSet::new();
     running.poll(Running::default(), &hub, &mut tasks);
-    tasks.spawn(age(Arc::clone(&hub)));
+    let heartbeats = Arc::default();
+    tasks.spawn(age(Arc::clone(&hub), Arc::clone(&heartbeats)));
     tasks.spawn(server::serve(listener, address, Arc::clone(&hub)));
     tracing::info!(%address, devices = site.devices.len(), "gateway started");
-    Ok(Gateway { address, asked: site.listen, stop, tasks, hub, running })
+    Ok(Gateway { address, asked: site.listen, stop, tasks, hub, running, heartbeats })
 }
 
 impl Gateway {
     /// Where it listens; with the port that the system chose when port 0 was asked for.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// How the devices fare.
+    pub fn tally(&self) -> Tally {
+        self.hub.table().tally()
+    }
+
+    /// Counts up each second, whenever the age of every value was looked at; it stands still when that, or any device,
+    /// hangs.
+    pub fn heartbeats(&self) -> u64 {
+        self.heartbeats.load(Ordering::Relaxed)
     }
 
     /// Goes on with another site file. A wire that it did not change stays open, a device that it did not change keeps
@@ -176,14 +191,17 @@ fn refused(address: SocketAddr, error: &io::Error) -> StartError {
 }
 
 /// Looks at the age of every value.
-async fn age(hub: Arc<Hub>) {
+async fn age(hub: Arc<Hub>, heartbeats: Arc<AtomicU64>) {
     let mut stop = hub.stop();
     let mut ticks = interval(AGEING);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         tokio::select! {
             () = stop.requested() => return,
-            _ = ticks.tick() => hub.expire(),
+            _ = ticks.tick() => {
+                hub.expire();
+                heartbeats.fetch_add(1, Ordering::Relaxed);
+            }
         }
     }
 }

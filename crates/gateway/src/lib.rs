@@ -34,3 +34,4 @@ mod wires;
 pub use crate::api::openapi;
 pub use crate::gateway::{Gateway, Options, StartError, start};
 pub use crate::site::{DEFAULT_LISTEN, Poll, Site, SiteDevice, SiteWire};
+pub use crate::table::Tally;
