@@ -6,6 +6,8 @@ use busbar_link::Endpoint;
 use busbar_profile::WordOrder;
 use clap::{Parser, Subcommand};
 
+use crate::logging::Format;
+
 /// Reads, commands, imitates and serves standby-power controllers over Modbus.
 #[derive(Debug, Parser)]
 #[command(name = "busbar", version, disable_help_subcommand = true, arg_required_else_help = true)]
@@ -66,6 +68,10 @@ pub(crate) struct Demo {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "SIGHUP reads the site file again; a wrong one is reported and changes nothing. SIGTERM and Ctrl-C end it in good\n\
+    order, twice at once. BUSBAR_LOG=debug tells more. docs/operation.md has the rest."
+)]
 pub(crate) struct Run {
     /// The site file: wires, devices, where to listen
     #[arg(long, value_name = "FILE")]
@@ -73,6 +79,12 @@ pub(crate) struct Run {
     /// Where the page is served, in place of what the site file says; port 0 takes a free one
     #[arg(long, value_name = "ADDR:PORT", value_parser = socket_address)]
     pub(crate) listen: Option<SocketAddr>,
+    /// Log every frame of a wire, both ways; may be repeated
+    #[arg(long, value_name = "WIRE")]
+    pub(crate) trace: Vec<String>,
+    /// How the log on standard error is written
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub(crate) log: Format,
     /// Folder for what must outlive a restart (nothing is kept yet)
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
