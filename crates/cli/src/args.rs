@@ -69,8 +69,8 @@ pub(crate) struct Demo {
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "SIGHUP reads the site file again; a wrong one is reported and changes nothing. SIGTERM and Ctrl-C end it in good\n\
-    order, twice at once. BUSBAR_LOG=debug tells more. docs/operation.md has the rest."
+    after_help = "SIGHUP reads the site file again; a wrong one is reported and changes nothing. Ctrl-C and SIGTERM end it in good\n\
+    order, a second one at once. docs/operation.md tells more."
 )]
 pub(crate) struct Run {
     /// The site file: wires, devices, where to listen
@@ -82,8 +82,8 @@ pub(crate) struct Run {
     /// Log every frame of a wire, both ways; may be repeated
     #[arg(long, value_name = "WIRE")]
     pub(crate) trace: Vec<String>,
-    /// How the log on standard error is written
-    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    /// The log on standard error: text for people, json for programs
+    #[arg(long, value_name = "FORMAT", default_value = "text", value_parser = log_format)]
     pub(crate) log: Format,
     /// Folder for what must outlive a restart (nothing is kept yet)
     #[arg(long, value_name = "DIR")]
@@ -288,6 +288,14 @@ fn socket_address(text: &str) -> Result<SocketAddr, String> {
         None => text.to_owned(),
     };
     address.parse().map_err(|_| "write ADDRESS:PORT, for example 127.0.0.1:8080".to_owned())
+}
+
+fn log_format(text: &str) -> Result<Format, String> {
+    match text {
+        "text" => Ok(Format::Text),
+        "json" => Ok(Format::Json),
+        _ => Err("a log is written as text or json".to_owned()),
+    }
 }
 
 /// Decimal, or hex behind `0x`.

@@ -2,7 +2,6 @@
 
 use std::{env, io};
 
-use clap::ValueEnum;
 use tracing_subscriber::EnvFilter;
 
 use crate::{failure::Failure, terminal};
@@ -13,13 +12,10 @@ const VARIABLE: &str = "BUSBAR_LOG";
 /// Frames are told only of wires that somebody asked for, and then always.
 const FRAMES: &str = "busbar::frames=info";
 
-/// How it is told.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+/// How it is told: lines for people, or one JSON document a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
-    /// Lines for people
-    #[default]
     Text,
-    /// One JSON document a line, for programs
     Json,
 }
 
