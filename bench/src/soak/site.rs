@@ -1,21 +1,23 @@
 //! The site of the soak: imitated D-500, each on a wire of its own, and a site file that has them all.
 
-use std::error::Error;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use busbar_emulator::{Config, Emulation};
 use busbar_link::{Endpoint, Link, LinkError, Options, Write};
 
+use super::Failure;
+
 const UNIT: u8 = 1;
 const PUSH_BUTTONS: u16 = 8193;
-const STOP_BUTTON: u16 = 1;
-const AUTO_BUTTON: u16 = 4;
+const STOP: u16 = 1;
+const AUTO: u16 = 4;
 
 /// Imitated controllers that run.
 pub(super) struct Fleet(Vec<Emulation>);
 
 impl Fleet {
-    pub(super) async fn start(devices: usize) -> Result<Self, Box<dyn Error>> {
+    pub(super) async fn start(devices: usize) -> Result<Self, Failure> {
         let mut fleet = Vec::with_capacity(devices);
         for seed in 1..=devices {
             let listen = vec![Endpoint::Tcp { host: "127.0.0.1".to_owned(), port: 0 }];
@@ -25,18 +27,13 @@ impl Fleet {
         Ok(Self(fleet))
     }
 
-    pub(super) fn endpoint(&self, device: usize) -> Result<&Endpoint, Box<dyn Error>> {
+    pub(super) fn endpoint(&self, device: usize) -> Result<&Endpoint, Failure> {
         let emulation = self.0.get(device).ok_or("no such device")?;
         Ok(emulation.urls().first().ok_or("a device without a port")?)
     }
 
-    /// Connections that the controllers have seen: each one more than its first is a reconnection.
-    pub(super) fn connections(&self) -> u64 {
-        self.0.iter().map(|emulation| emulation.statistics().connections).sum()
-    }
-
     /// Writes the site file.
-    pub(super) fn write_site(&self, folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
+    pub(super) fn write_site(&self, folder: &Path) -> Result<PathBuf, Failure> {
         let mut text = "[site]\nname = \"Soak\"\n".to_owned();
         for device in 0..self.0.len() {
             let endpoint = self.endpoint(device)?;
@@ -59,15 +56,23 @@ pub(super) struct Person {
 }
 
 impl Person {
-    pub(super) fn new(endpoint: &Endpoint) -> Result<Self, Box<dyn Error>> {
-        Ok(Self { link: Link::open(endpoint.clone(), Options::default())?, stopped: false })
+    pub(super) fn new(endpoint: &Endpoint) -> Result<Self, Failure> {
+        // The machine may be busy; it is not what is judged.
+        let patience = Duration::from_secs(20);
+        let options = Options { timeout: patience, connect_timeout: patience, ..Options::default() };
+        Ok(Self { link: Link::open(endpoint.clone(), options)?, stopped: false })
     }
 
-    /// The mode changes while this is awaited; gives back the mode that it changes to.
-    pub(super) async fn press(&mut self) -> Result<&'static str, LinkError> {
+    /// The mode that the next press changes to, as its register has it.
+    pub(super) fn next_mode(&self) -> u16 {
+        if self.stopped { AUTO } else { STOP }
+    }
+
+    /// The mode changes while this is awaited.
+    pub(super) async fn press(&mut self) -> Result<(), LinkError> {
+        // The button of a mode has the mode's own number.
+        let value = self.next_mode();
         self.stopped = !self.stopped;
-        let (value, mode) = if self.stopped { (STOP_BUTTON, "STOP") } else { (AUTO_BUTTON, "AUTO") };
-        self.link.write(UNIT, Write::Register { address: PUSH_BUTTONS, value }).await?;
-        Ok(mode)
+        self.link.write(UNIT, Write::Register { address: PUSH_BUTTONS, value }).await
     }
 }

@@ -1,6 +1,5 @@
 //! A client of the gateway: single requests, and the event stream taken apart into events.
 
-use std::error::Error;
 use std::net::SocketAddr;
 use std::time::Duration;
 
@@ -8,11 +7,13 @@ use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
 use tokio::time::timeout;
 
+use super::Failure;
+
 /// Nothing of the gateway takes longer: the stream is kept alive more often than this.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Sends a request; what comes back is still to be read.
-pub(super) async fn ask(address: SocketAddr, path: &str) -> Result<TcpStream, Box<dyn Error + Send + Sync>> {
+pub(super) async fn ask(address: SocketAddr, path: &str) -> Result<TcpStream, Failure> {
     let mut stream = TcpStream::connect(address).await?;
     let request = format!("GET {path} HTTP/1.1\r\nHost: {address}\r\n\r\n");
     stream.write_all(request.as_bytes()).await?;
@@ -29,7 +30,7 @@ pub(super) struct Body {
 
 impl Body {
     /// Asks and reads the head of the answer.
-    pub(super) async fn of(address: SocketAddr, path: &str) -> Result<Self, Box<dyn Error + Send + Sync>> {
+    pub(super) async fn of(address: SocketAddr, path: &str) -> Result<Self, Failure> {
         let stream = BufReader::with_capacity(65_536, ask(address, path).await?);
         let mut body = Self { stream, left: None, line: String::new() };
         if !body.line().await?.starts_with("HTTP/1.1 200 ") {
@@ -47,14 +48,14 @@ impl Body {
     }
 
     /// The whole of it.
-    pub(super) async fn whole(mut self) -> Result<Vec<u8>, Box<dyn Error + Send + Sync>> {
+    pub(super) async fn whole(mut self) -> Result<Vec<u8>, Failure> {
         let mut whole = Vec::new();
         while self.more(&mut whole).await? {}
         Ok(whole)
     }
 
     /// Appends the next part; false at the end.
-    pub(super) async fn more(&mut self, out: &mut Vec<u8>) -> Result<bool, Box<dyn Error + Send + Sync>> {
+    pub(super) async fn more(&mut self, out: &mut Vec<u8>) -> Result<bool, Failure> {
         let chunked = self.left.is_none();
         let count = match self.left.take() {
             Some(left) => left,
@@ -71,7 +72,7 @@ impl Body {
         Ok(count > 0)
     }
 
-    async fn line(&mut self) -> Result<&str, Box<dyn Error + Send + Sync>> {
+    async fn line(&mut self) -> Result<&str, Failure> {
         self.line.clear();
         match timeout(PATIENCE, self.stream.read_line(&mut self.line)).await?? {
             0 => Err("the gateway closed a connection".into()),
@@ -95,13 +96,13 @@ pub(super) struct Event<'a> {
 }
 
 impl Events {
-    pub(super) async fn open(address: SocketAddr, query: &str) -> Result<Self, Box<dyn Error + Send + Sync>> {
+    pub(super) async fn open(address: SocketAddr, query: &str) -> Result<Self, Failure> {
         let body = Body::of(address, &format!("/api/v1/events{query}")).await?;
         Ok(Self { body, bytes: Vec::new(), given: 0 })
     }
 
     /// The next event; comments are passed over.
-    pub(super) async fn next(&mut self) -> Result<Event<'_>, Box<dyn Error + Send + Sync>> {
+    pub(super) async fn next(&mut self) -> Result<Event<'_>, Failure> {
         let mut sought = 0;
         self.bytes.drain(..std::mem::take(&mut self.given));
         loop {
@@ -125,7 +126,7 @@ impl Events {
 }
 
 impl<'a> Event<'a> {
-    fn parse(text: &'a str) -> Result<Self, Box<dyn Error + Send + Sync>> {
+    fn parse(text: &'a str) -> Result<Self, Failure> {
         let field = |name: &str| {
             let mut values = text.lines().filter_map(|line| line.strip_prefix(name)?.strip_prefix(':'));
             values.next().map(str::trim_start)
