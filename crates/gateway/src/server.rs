@@ -101,10 +101,11 @@ async fn connection(stream: TcpStream, router: Router, mut stop: Stop) {
 
 /// Everything that is served.
 fn router(hub: Arc<Hub>, address: SocketAddr) -> Router {
+    let page = page::router(Arc::clone(&hub));
     let api = api::router(hub)
         .layer(CompressionLayer::new())
         .layer(header_unless_set(header::CACHE_CONTROL, "no-store"));
-    guarded(Router::new().merge(api).merge(page::router()), address.ip())
+    guarded(Router::new().merge(api).merge(page), address.ip())
 }
 
 /// Routes behind everything that guards them and speaks for what they do not know.
