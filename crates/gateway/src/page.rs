@@ -14,7 +14,6 @@ use axum::response::{Html, IntoResponse, Response};
 use axum::routing::get;
 use jiff::Timestamp;
 use memory_serve::CacheControl;
-use tower_http::compression::CompressionLayer;
 
 use crate::hub::Hub;
 
@@ -24,8 +23,8 @@ const DOCUMENT: &str = include_str!(concat!(env!("OUT_DIR"), "/index.html"));
 /// Where the site goes.
 const PLACE: &str = "<!--first-->";
 
-/// Every file of the page, `/` included.
-pub(crate) fn router(hub: Arc<Hub>) -> Router {
+/// Every file of the page, but for the document at `/`.
+pub(crate) fn files() -> Router {
     // Its files are unpacked once and never freed, so there is one for all gateways of this process.
     static FILES: LazyLock<Router> = LazyLock::new(|| {
         memory_serve::load!()
@@ -38,12 +37,16 @@ pub(crate) fn router(hub: Arc<Hub>) -> Router {
             .into_router()
             .layer(from_fn(keep_hashed))
     });
-    let document = Router::new().route("/", get(document)).with_state(hub).layer(CompressionLayer::new());
-    FILES.clone().merge(document)
+    FILES.clone()
+}
+
+/// The document at `/`.
+pub(crate) fn document(hub: Arc<Hub>) -> Router {
+    Router::new().route("/", get(written)).with_state(hub)
 }
 
 /// The document with the site in it; it is another one each time, so nobody is asked to remember it.
-async fn document(State(hub): State<Arc<Hub>>) -> Response {
+async fn written(State(hub): State<Arc<Hub>>) -> Response {
     let body = DOCUMENT.replacen(PLACE, &first::html(&hub, Timestamp::now()), 1);
     ([(header::CACHE_CONTROL, "no-cache")], Html(body)).into_response()
 }

@@ -94,7 +94,8 @@ export class Stream {
       else if (name === 'resumed') this.#missing = 0
       // Changes mean nothing before the state they change.
       else if (this.#missing === undefined) return
-      else if (name === 'state') this.#missing -= 1
+      // A reader that fell behind gets states without a snapshot.
+      else if (name === 'state') this.#missing = Math.max(0, this.#missing - 1)
       this.#handle(name, payload)
     } catch (error) {
       // Half a state is worse than none: a snapshot sets it right.

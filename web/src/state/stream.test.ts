@@ -76,6 +76,14 @@ describe('while all is well', () => {
     expect(stream.phase).toBe('live')
   })
 
+  test('states without a snapshot, for a reader that fell behind, do not end that', () => {
+    open()
+    last().emit('state', '{"device":"gen1"}')
+    expect(stream.phase).toBe('live')
+    later(4000)
+    expect(sources).toHaveLength(2)
+  })
+
   test('a snapshot in between does not end that', () => {
     open()
     last().emit('snapshot', '{"devices":[1]}')
