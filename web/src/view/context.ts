@@ -3,10 +3,10 @@ import { getContext, setContext } from 'svelte'
 import { clockText, zoneOf } from '../logic/format'
 import type { Page } from '../state/page.svelte'
 
-const KEY = Symbol('page')
+export const PAGE = Symbol('page')
 
-export const providePage = (page: Page): Page => setContext(KEY, page)
-export const usePage = (): Page => getContext<Page>(KEY)
+export const providePage = (page: Page): Page => setContext(PAGE, page)
+export const usePage = (): Page => getContext<Page>(PAGE)
 
 /** Whether a person followed a card: its page then takes the focus that went with the card. */
 export const followed = { card: false }
