@@ -2,7 +2,7 @@
 
 export type Phase = 'connecting' | 'live' | 'lost'
 
-const EVENTS = ['snapshot', 'values', 'device', 'alarms'] as const
+const EVENTS = ['snapshot', 'state', 'values', 'device', 'alarms'] as const
 export type EventName = (typeof EVENTS)[number]
 
 /** What is used of an EventSource. */
