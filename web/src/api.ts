@@ -340,6 +340,45 @@ export interface components {
          * @enum {string}
          */
         Class: "shutdown" | "load_dump" | "trip" | "warning" | "indication" | "status";
+        /** @description The site file that runs, and the one that was refused. */
+        ConfigView: {
+            /** @description When the one that runs was accepted. */
+            loaded: components["schemas"]["Time"];
+            refused: components["schemas"]["RefusedView"] | null;
+        };
+        /** @description A line between two nodes, with a breaker in it or without. */
+        ConnectionView: {
+            /**
+             * @description The signal that says whether the breaker is closed; null for a plain line.
+             * @example breaker.mains.closed
+             */
+            breaker: string | null;
+            /**
+             * @description Id of the device that knows the breaker; null for a plain line.
+             * @example gen1
+             */
+            device: string | null;
+            /**
+             * @description Id of the node nearer to the source.
+             * @example utility
+             */
+            from: string;
+            /**
+             * @description Id of the other node.
+             * @example bus
+             */
+            to: string;
+        };
+        /** @description What the site file wants of a device. The gateway does nothing about it; a person does. */
+        DesiredView: {
+            /** @description Whether it is; null while that is not known. */
+            met: boolean | null;
+            /**
+             * @description The mode that it should be in.
+             * @example auto
+             */
+            mode: string;
+        };
         /** @description One device in a snapshot. */
         DeviceSnapshot: {
             /** @description The device. */
@@ -358,6 +397,7 @@ export interface components {
              * @example shutdown_alarms: the device answered exception 2 (illegal address)
              */
             alarms_fault: string | null;
+            desired: components["schemas"]["DesiredView"] | null;
             /**
              * @description One sentence on what is wrong with reaching the device; null while nothing is.
              * @example Genset 1 cannot be read: unit 1 did not answer within 1s, asked 2 times: check the unit id and that the device is on; docs/connect/datakom-d.md says how to set it up and wire it
@@ -368,6 +408,8 @@ export interface components {
              * @example gen1
              */
             id: string;
+            /** @description Whether it is the device that the site file says. */
+            identity: components["schemas"]["IdentityView"];
             /** @description What kind of controller it is. */
             kind: components["schemas"]["Kind"];
             last_seen: components["schemas"]["Time"] | null;
@@ -384,6 +426,8 @@ export interface components {
              * @example Genset 1
              */
             name: string;
+            /** @description What the site file says of the machine. */
+            nameplate: components["schemas"]["NameplateView"];
             /** @description True while the device answers, even with an exception. */
             online: boolean;
             /**
@@ -408,6 +452,13 @@ export interface components {
              * @example gen1
              */
             wire: string;
+        };
+        /** @description How the site is connected: what there is, and what joins it. */
+        DiagramView: {
+            /** @description What joins them, in the order of the site file. */
+            connections: components["schemas"]["ConnectionView"][];
+            /** @description Sources, buses and loads, in the order of the site file. */
+            nodes: components["schemas"]["NodeView"][];
         };
         /** @description How often a device answered with one exception code. */
         ExceptionCount: {
@@ -439,6 +490,22 @@ export interface components {
              * @example Genset
              */
             title: string;
+        };
+        /**
+         * @description What is known of a device's identity.
+         * @enum {string}
+         */
+        Identity: "unknown" | "plausible" | "confirmed" | "wrong";
+        /** @description Whether the device on the wire is the one that the site file says. */
+        IdentityView: {
+            checked: components["schemas"]["Time"] | null;
+            /**
+             * @description Why, in one sentence; null while nothing is known.
+             * @example it says that it is a D-500
+             */
+            detail: string | null;
+            /** @description What is known. */
+            verdict: components["schemas"]["Identity"];
         };
         /** @description What a joined signal is: one value out of several points, such as hours out of hours, minutes and seconds. */
         JoinedPointView: {
@@ -545,6 +612,55 @@ export interface components {
              * @example AUTO
              */
             label: string;
+        };
+        /** @description What stands on the machine and what belongs to it. Null where the site file does not say. */
+        NameplateView: {
+            /**
+             * Format: double
+             * @description Nominal voltage of the starter battery.
+             * @example 24
+             */
+            battery_v: number | null;
+            /**
+             * Format: double
+             * @description Power in kW.
+             * @example 400
+             */
+            power_kw: number | null;
+            /**
+             * Format: double
+             * @description Fuel that the tank holds in litres.
+             * @example 900
+             */
+            tank_l: number | null;
+        };
+        /** @description A source, a bus or a load. */
+        NodeView: {
+            /**
+             * @description Id of the device whose signals describe it; null when none does.
+             * @example gen1
+             */
+            device: string | null;
+            /**
+             * @description Its id.
+             * @example utility
+             */
+            id: string;
+            /**
+             * @description What it is: `mains`, `genset`, `bus`, `load` or `compressor`.
+             * @example mains
+             */
+            kind: string;
+            /**
+             * @description Its name.
+             * @example Utility feed
+             */
+            name: string;
+            /**
+             * @description Which object of that device's signals it is; null when no device describes it.
+             * @example mains
+             */
+            signals: string | null;
         };
         /** @description What one device is polled with. */
         PlanView: {
@@ -756,37 +872,50 @@ export interface components {
          * @enum {string}
          */
         Rate: "fast" | "slow" | "once" | "on_demand";
+        /** @description A site file that was refused. */
+        RefusedView: {
+            /** @description When. */
+            at: components["schemas"]["Time"];
+            /**
+             * @description What is wrong with it.
+             * @example site.toml:14:1: the wire `line` is not defined
+             */
+            reason: string;
+        };
         /** @description The site, without its devices. */
         SiteInfo: {
+            /** @description Which site file runs. */
+            config: components["schemas"]["ConfigView"];
             /**
              * @description The name the site file gives.
              * @example North hospital
              */
             name: string;
+            /**
+             * Format: int64
+             * @description Counts the site files that were accepted: 1 at start, one more after each reload.
+             * @example 1
+             */
+            revision: number;
             /** @description When this gateway started. */
             started: components["schemas"]["Time"];
+            /**
+             * @description The IANA time zone of the site; null when the site file gives none.
+             * @example Europe/Berlin
+             */
+            time_zone: string | null;
             /**
              * @description Version of the gateway.
              * @example 0.1.0
              */
             version: string;
         };
-        /** @description The site and every device on it. */
-        SiteView: {
+        /** @description The site, how it is connected, and every device on it. */
+        SiteView: components["schemas"]["SiteInfo"] & {
             /** @description The devices in the order of the site file. */
             devices: components["schemas"]["DeviceView"][];
-            /**
-             * @description The name the site file gives.
-             * @example North hospital
-             */
-            name: string;
-            /** @description When this gateway started. */
-            started: components["schemas"]["Time"];
-            /**
-             * @description Version of the gateway.
-             * @example 0.1.0
-             */
-            version: string;
+            /** @description How it is connected. */
+            diagram: components["schemas"]["DiagramView"];
         };
         /** @description `event: snapshot`: everything, sent first and again after a reader fell behind. */
         SnapshotEvent: {

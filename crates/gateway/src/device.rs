@@ -10,8 +10,8 @@ use busbar_profile::{Decoded, Image, Profile, Quality, Rate, reading};
 
 use crate::alarms::{self, Alarms};
 use crate::api::types::{
-    AlarmView, BitView, ChoiceView, DeviceView, GroupView, JoinedPointView, JoinedView, ModeView, PointView,
-    PointsView, StateView, Time, ValueView,
+    AlarmView, BitView, ChoiceView, DeviceView, GroupView, Identity, IdentityView, JoinedPointView,
+    JoinedView, ModeView, NameplateView, PointView, PointsView, StateView, Time, ValueView,
 };
 use crate::failure::Failure;
 use crate::joined::{self, Joined};
@@ -411,6 +411,9 @@ impl Device {
             alarms: self.alarms.counts(),
             alarms_fault: self.alarms_fault(),
             last_seen: self.last_seen,
+            identity: IdentityView { verdict: Identity::Unknown, detail: None, checked: None },
+            desired: None,
+            nameplate: NameplateView::default(),
         }
     }
 

@@ -3,6 +3,7 @@
 //! All readers share one bounded ring of events, each written once as bytes. A reader that falls out of it gets a
 //! fresh snapshot, so one that never reads costs a socket buffer and nothing else.
 
+use std::collections::HashMap;
 use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,13 +21,20 @@ use crate::stop::Stop;
 /// Proxies close what says nothing for long.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
-/// What changed on one device, ready to be sent.
+/// What changed, ready to be sent.
 #[derive(Debug)]
-pub(crate) struct Event {
-    pub(crate) device: usize,
-    /// Counts up for each device.
-    pub(crate) sequence: u64,
-    pub(crate) frames: Bytes,
+pub(crate) enum Event {
+    /// One device.
+    Device {
+        key: u64,
+        /// Counts up for each device.
+        sequence: u64,
+        frames: Bytes,
+    },
+    /// What is known of the site file.
+    Site { frames: Bytes },
+    /// The devices and wires themselves.
+    Exchanged,
 }
 
 /// Appends one server-sent event. JSON has no line breaks of its own, so one `data` line holds it.
@@ -43,7 +51,7 @@ pub(crate) fn frame(out: &mut Vec<u8>, name: &str, data: &impl Serialize) {
 }
 
 /// The answer to `/api/v1/events`: endless, ends with the gateway.
-pub(crate) fn response(hub: Arc<Hub>, only: Option<usize>) -> Response {
+pub(crate) fn response(hub: Arc<Hub>, only: Option<u64>) -> Response {
     let reader = Reader::new(hub, only);
     let chunks = stream::unfold(reader, async |mut reader| {
         let chunk = reader.next().await?;
@@ -62,18 +70,18 @@ pub(crate) fn response(hub: Arc<Hub>, only: Option<usize>) -> Response {
 /// One reader of the stream.
 struct Reader {
     hub: Arc<Hub>,
-    only: Option<usize>,
+    only: Option<u64>,
     events: broadcast::Receiver<Arc<Event>>,
-    /// By device: the last event that the reader has seen, in a snapshot or by itself.
-    seen: Vec<u64>,
+    /// By key of the device: the last event that the reader has seen, in a snapshot or by itself.
+    seen: HashMap<u64, u64>,
     behind: bool,
     stop: Stop,
 }
 
 impl Reader {
-    fn new(hub: Arc<Hub>, only: Option<usize>) -> Self {
+    fn new(hub: Arc<Hub>, only: Option<u64>) -> Self {
         let (events, stop) = (hub.subscribe(), hub.stop());
-        Self { hub, only, events, seen: Vec::new(), behind: true, stop }
+        Self { hub, only, events, seen: HashMap::new(), behind: true, stop }
     }
 
     /// The next bytes to send; none at the end.
@@ -89,28 +97,30 @@ impl Reader {
                 () = tokio::time::sleep(KEEP_ALIVE) => return Some(Bytes::from_static(b": keep-alive\n\n")),
             };
             match event {
-                Ok(event) => {
-                    if let Some(frames) = self.take(&event) {
-                        return Some(frames);
+                Ok(event) => match &*event {
+                    Event::Exchanged => return Some(self.snapshot()),
+                    Event::Site { frames } => return Some(frames.clone()),
+                    Event::Device { key, sequence, frames } => {
+                        if self.is_news(*key, *sequence) {
+                            return Some(frames.clone());
+                        }
                     }
-                }
+                },
                 Err(RecvError::Lagged(_)) => return Some(self.snapshot()),
                 Err(RecvError::Closed) => return None,
             }
         }
     }
 
-    /// The frames of an event, unless the reader did not ask for them or has them already.
-    fn take(&mut self, event: &Event) -> Option<Bytes> {
-        if self.only.is_some_and(|only| only != event.device) {
-            return None;
+    /// Whether the reader asked for this event and does not have it already.
+    fn is_news(&mut self, key: u64, sequence: u64) -> bool {
+        if self.only.is_some_and(|only| only != key) {
+            return false;
         }
-        let seen = self.seen.get_mut(event.device)?;
-        if event.sequence <= *seen {
-            return None;
-        }
-        *seen = event.sequence;
-        Some(event.frames.clone())
+        let Some(seen) = self.seen.get_mut(&key) else { return false };
+        let news = sequence > *seen;
+        *seen = sequence.max(*seen);
+        news
     }
 
     /// Everything as it stands. What is still in the ring is older and would only be passed over.
@@ -146,7 +156,7 @@ mod tests {
     }
 
     fn round(hub: &Hub, device: usize, registers: &[u16]) {
-        hub.finish(device, answered(Rate::Fast, &[(100, registers)]));
+        hub.finish(&hub.table().devices[device], answered(Rate::Fast, &[(100, registers)]));
     }
 
     /// The events of a chunk: name and data.
@@ -214,11 +224,11 @@ mod tests {
         let mut reader = Reader::new(Arc::clone(&hub), None);
         next(&mut reader).await;
         // Two rounds of the first device are in the snapshot, none of the second.
-        let event = |device, sequence| Event { device, sequence, frames: Bytes::from_static(b"x") };
-        assert_eq!(reader.take(&event(0, 2)), None);
-        assert_eq!(reader.take(&event(0, 3)), Some(Bytes::from_static(b"x")));
-        assert_eq!(reader.take(&event(0, 3)), None);
-        assert_eq!(reader.take(&event(1, 1)), Some(Bytes::from_static(b"x")));
+        let [first, second] = [0, 1].map(|device: usize| hub.table().devices[device].key);
+        assert!(!reader.is_news(first, 2));
+        assert!(reader.is_news(first, 3));
+        assert!(!reader.is_news(first, 3));
+        assert!(reader.is_news(second, 1));
     }
 
     #[tokio::test]
@@ -250,7 +260,7 @@ mod tests {
     #[tokio::test]
     async fn a_reader_of_one_device_hears_of_no_other() {
         let (hub, _announcer) = site();
-        let mut reader = Reader::new(Arc::clone(&hub), Some(1));
+        let mut reader = Reader::new(Arc::clone(&hub), Some(hub.table().devices[1].key));
         let first = next(&mut reader).await;
         assert_eq!(first[0].1["devices"].as_array().unwrap().len(), 1);
         round(&hub, 0, &FAST);

@@ -5,18 +5,17 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use busbar_link::{Link, OpenError};
+use busbar_link::OpenError;
 use thiserror::Error;
 use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
-use crate::device::Device;
 use crate::hub::Hub;
-use crate::poller::{PolledWire, Poller};
-use crate::site::{Site, SiteWire};
+use crate::running::{Running, Unopened};
+use crate::server;
+use crate::site::Site;
 use crate::stop::{self, Announcer};
-use crate::{server, wires};
 
 /// How often values are looked at for their age.
 const AGEING: Duration = Duration::from_secs(1);
@@ -62,8 +61,12 @@ pub enum StartError {
 #[derive(Debug)]
 pub struct Gateway {
     address: SocketAddr,
+    /// Where the site file said to listen when it started.
+    asked: SocketAddr,
     stop: Announcer,
     tasks: JoinSet<()>,
+    hub: Arc<Hub>,
+    running: Running,
 }
 
 /// Starts the gateway of a site: opens its wires, polls its devices, and serves the API and the page.
@@ -76,28 +79,17 @@ pub struct Gateway {
 pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> {
     let listener = listen(options.listen.unwrap_or(site.listen)).await?;
     let address = listener.local_addr().map_err(|error| refused(site.listen, &error))?;
-    let links = open(&site)?;
-    for warning in &site.warnings {
-        tracing::warn!("{warning}");
-    }
+    let mut running = Running::default().next(&site)?;
+    warn(&site);
 
     let (stop, stopped) = stop::channel();
-    let devices =
-        site.devices.iter().map(|device| Device::new(device.clone(), site.wires[device.wire].id.clone()));
-    let named = site.wires.iter().map(|wire| wire.id.clone()).zip(links.iter().cloned());
-    let hub = Arc::new(Hub::new(site.name.clone(), devices.collect(), named.collect(), stopped));
-
+    let hub = Arc::new(Hub::new(running.table(&site), stopped));
     let mut tasks = JoinSet::new();
-    for (index, device) in site.devices.iter().enumerate() {
-        let cost = wires::cost(&site.wires[device.wire].endpoint, device.profile);
-        let link = wires::for_polling(&links[device.wire]);
-        let wire = PolledWire { link, cost };
-        tasks.spawn(Poller::new(Arc::clone(&hub), index, device.clone(), wire).run());
-    }
+    running.poll(Running::default(), &hub, &mut tasks);
     tasks.spawn(age(Arc::clone(&hub)));
-    tasks.spawn(server::serve(listener, address, hub));
+    tasks.spawn(server::serve(listener, address, Arc::clone(&hub)));
     tracing::info!(%address, devices = site.devices.len(), "gateway started");
-    Ok(Gateway { address, stop, tasks })
+    Ok(Gateway { address, asked: site.listen, stop, tasks, hub, running })
 }
 
 impl Gateway {
@@ -106,14 +98,57 @@ impl Gateway {
         self.address
     }
 
+    /// Goes on with another site file. A wire that it did not change stays open, a device that it did not change keeps
+    /// its values. Where the gateway listens stays as it is until it is started anew.
+    ///
+    /// # Errors
+    ///
+    /// [`StartError::Wire`]; the site before goes on as it was.
+    pub fn reload(&mut self, site: Site) -> Result<(), StartError> {
+        let mut next = self.running.next(&site)?;
+        warn(&site);
+        if site.listen != self.asked {
+            tracing::warn!(
+                "the site file says to listen on {}, which takes a restart; the gateway goes on at {}",
+                site.listen,
+                self.address
+            );
+        }
+        self.hub.exchange(next.table(&site));
+        let before = std::mem::take(&mut self.running);
+        next.poll(before, &self.hub, &mut self.tasks);
+        self.running = next;
+        while self.tasks.try_join_next().is_some() {}
+        tracing::info!(devices = site.devices.len(), "the site file was read again");
+        Ok(())
+    }
+
+    /// Tells everybody that a newer site file was refused, and why; the one before it goes on.
+    pub fn refuse(&self, reason: impl Into<String>) {
+        self.hub.refuse(reason.into());
+    }
+
     /// Ends polling, tells every reader of the event stream, and returns when nothing of the gateway runs any more.
     pub async fn shutdown(mut self) {
         self.stop.announce();
+        self.running = Running::default();
         let ended = async { while self.tasks.join_next().await.is_some() {} };
         if timeout(server::FAREWELL + Duration::from_secs(1), ended).await.is_err() {
             tracing::warn!("some tasks did not end in time and were cut off");
         }
         self.tasks.shutdown().await;
+    }
+}
+
+fn warn(site: &Site) {
+    for warning in &site.warnings {
+        tracing::warn!("{warning}");
+    }
+}
+
+impl From<Unopened> for StartError {
+    fn from(Unopened { wire, source }: Unopened) -> Self {
+        Self::Wire { wire, source }
     }
 }
 
@@ -138,13 +173,6 @@ fn refused(address: SocketAddr, error: &io::Error) -> StartError {
             StartError::Listen { address, kind, reason }
         }
     }
-}
-
-fn open(site: &Site) -> Result<Vec<Link>, StartError> {
-    let open = |(index, wire): (usize, &SiteWire)| {
-        wires::open(site, index, wire).map_err(|source| StartError::Wire { wire: wire.id.clone(), source })
-    };
-    site.wires.iter().enumerate().map(open).collect()
 }
 
 /// Looks at the age of every value.

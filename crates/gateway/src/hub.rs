@@ -3,78 +3,57 @@
 //! Every device has a lock of its own that is held for microseconds and never across an await, so a reader of the
 //! API holds up no poller and one device holds up no other.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
 use axum::http::StatusCode;
-use busbar_link::Link;
 use busbar_profile::{Profile, Rate};
 use tokio::sync::broadcast;
 use tokio::time::Instant;
 
 use crate::api::types::{
-    AlarmView, AlarmsEvent, DeviceSnapshot, DeviceView, JoinedView, PointsView, SiteInfo, SiteView,
-    SnapshotEvent, Time, ValueView, ValuesEvent, WireDetailView, WireView,
+    AlarmView, AlarmsEvent, ConfigView, DeviceSnapshot, DeviceView, JoinedView, PointsView, RefusedView,
+    SiteInfo, SiteView, SnapshotEvent, Time, ValueView, ValuesEvent, WireDetailView, WireView,
 };
 use crate::api::{PointsQuery, Problem, ValuesQuery};
-use crate::device::{Changes, Device, Round, points_view};
+use crate::device::{Changes, Device, Round};
 use crate::events::{Event, frame};
 use crate::joined;
 use crate::poll_plan::Overview;
 use crate::rates::Rates;
 use crate::site::SiteDevice;
 use crate::stop::Stop;
+use crate::table::{Live, Slot, Table};
 use crate::wires;
 
 /// The live site.
 #[derive(Debug)]
 pub(crate) struct Hub {
-    info: SiteInfo,
-    devices: Vec<Slot>,
-    wires: Vec<(String, Link)>,
+    table: RwLock<Arc<Table>>,
+    config: Mutex<Config>,
+    started: Time,
     events: broadcast::Sender<Arc<Event>>,
     stop: Stop,
     origin: Instant,
 }
 
-/// One device behind its lock.
+/// What became of the site files.
 #[derive(Debug)]
-struct Slot {
-    id: String,
-    points: PointsView,
-    live: Mutex<Live>,
-    /// What it is read with; empty until its poller has begun.
-    plan: Mutex<Overview>,
-}
-
-#[derive(Debug)]
-struct Live {
-    device: Device,
-    /// Number of the last event of this device: an event that a snapshot already holds is not sent after it.
-    sequence: u64,
-}
-
-impl Slot {
-    /// A panic under this lock is caught by the task it happened in; what is left is still the last good state.
-    fn lock(&self) -> MutexGuard<'_, Live> {
-        self.live.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+struct Config {
+    revision: u64,
+    view: ConfigView,
 }
 
 impl Hub {
-    pub(crate) fn new(name: String, devices: Vec<Device>, wires: Vec<(String, Link)>, stop: Stop) -> Self {
+    pub(crate) fn new(table: Table, stop: Stop) -> Self {
         // Room for the events of a few seconds; a reader that is further behind gets a snapshot, which costs less.
-        let capacity = (devices.len() * 8).clamp(256, 16_384);
-        let slot = |device: Device| Slot {
-            id: device.site().id.clone(),
-            points: points_view(device.site().profile),
-            live: Mutex::new(Live { device, sequence: 0 }),
-            plan: Mutex::default(),
-        };
+        let capacity = (table.devices.len() * 8).clamp(256, 16_384);
+        let now = wall_clock();
         Self {
-            info: SiteInfo { name, version: env!("CARGO_PKG_VERSION").to_owned(), started: wall_clock() },
-            devices: devices.into_iter().map(slot).collect(),
-            wires,
+            table: RwLock::new(Arc::new(table)),
+            config: Mutex::new(Config { revision: 1, view: ConfigView { loaded: now, refused: None } }),
+            started: now,
             events: broadcast::Sender::new(capacity),
             stop,
             origin: Instant::now(),
@@ -91,25 +70,48 @@ impl Hub {
         self.stop.clone()
     }
 
+    /// The devices and wires as they stand; whoever keeps it keeps what a reload may have replaced.
+    pub(crate) fn table(&self) -> Arc<Table> {
+        Arc::clone(&self.table.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Another site file runs from now on.
+    pub(crate) fn exchange(&self, table: Table) {
+        {
+            let mut config = self.config();
+            config.revision += 1;
+            config.view = ConfigView { loaded: wall_clock(), refused: None };
+        }
+        *self.table.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(table);
+        self.tell(Event::Exchanged);
+    }
+
+    /// A newer site file was refused; the one before it goes on.
+    pub(crate) fn refuse(&self, reason: String) {
+        self.config().view.refused = Some(RefusedView { at: wall_clock(), reason });
+        let mut frames = Vec::new();
+        frame(&mut frames, "site", &self.info());
+        self.tell(Event::Site { frames: frames.into() });
+    }
+
+    fn config(&self) -> MutexGuard<'_, Config> {
+        self.config.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Takes over a finished round of a device and tells who listens.
-    pub(crate) fn finish(&self, device: usize, round: Round) {
+    pub(crate) fn finish(&self, slot: &Slot, round: Round) {
         let (now, ts, rates) = (self.now(), wall_clock(), round.rates);
-        let mut live = self.devices[device].lock();
+        let mut live = slot.lock();
         let (was_online, had_fault) = (live.device.is_online(), live.device.fault().map(str::to_owned));
         let changes = live.device.finish(round, now, ts);
         note(&live.device, was_online, had_fault.as_deref());
         let rounds = by_rate(rates, ts, changes, live.device.site().profile);
-        self.publish(device, &mut live, &rounds);
-    }
-
-    /// Takes over what a device is read with from now on.
-    pub(crate) fn planned(&self, device: usize, plan: Overview) {
-        *self.devices[device].plan.lock().unwrap_or_else(PoisonError::into_inner) = plan;
+        self.publish(slot, &mut live, &rounds);
     }
 
     /// Marks what became too old on any device.
     pub(crate) fn expire(&self) {
-        for (index, slot) in self.devices.iter().enumerate() {
+        for slot in &self.table().devices {
             let mut live = slot.lock();
             let expired = live.device.expire(self.now());
             if expired.is_empty() {
@@ -118,11 +120,11 @@ impl Hub {
             let at = |live: &Live, rate| live.device.last_round(rate).unwrap_or_else(wall_clock);
             let events: Vec<_> =
                 expired.into_iter().map(|(rate, changes)| (rate, at(&live, rate), changes)).collect();
-            self.publish(index, &mut live, &events);
+            self.publish(slot, &mut live, &events);
         }
     }
 
-    fn publish(&self, index: usize, live: &mut Live, rounds: &[(Rate, Time, Changes)]) {
+    fn publish(&self, slot: &Slot, live: &mut Live, rounds: &[(Rate, Time, Changes)]) {
         live.sequence += 1;
         if self.events.receiver_count() == 0 {
             return;
@@ -148,40 +150,52 @@ impl Hub {
                 frame(&mut frames, "device", &device.view());
             }
         }
+        self.tell(Event::Device { key: slot.key, sequence: live.sequence, frames: frames.into() });
+    }
+
+    fn tell(&self, event: Event) {
         // Nobody listening is no error.
-        let _ = self.events.send(Arc::new(Event {
-            device: index,
-            sequence: live.sequence,
-            frames: frames.into(),
-        }));
+        let _ = self.events.send(Arc::new(event));
     }
 }
 
 /// What the API asks.
 impl Hub {
+    pub(crate) fn info(&self) -> SiteInfo {
+        let table = self.table();
+        let config = self.config();
+        SiteInfo {
+            name: table.name.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            started: self.started,
+            time_zone: table.time_zone.clone(),
+            revision: config.revision,
+            config: config.view.clone(),
+        }
+    }
+
     pub(crate) fn site(&self) -> SiteView {
-        let SiteInfo { name, version, started } = self.info.clone();
-        SiteView { name, version, started, devices: self.device_views() }
+        SiteView { site: self.info(), devices: self.device_views(), diagram: self.table().diagram.clone() }
     }
 
     pub(crate) fn device_views(&self) -> Vec<DeviceView> {
-        self.devices.iter().map(|slot| slot.lock().device.view()).collect()
+        self.table().devices.iter().map(|slot| slot.lock().device.view()).collect()
     }
 
     pub(crate) fn device_view(&self, id: &str) -> Result<DeviceView, Problem> {
-        Ok(self.slot(id)?.lock().device.view())
+        Ok(self.device(id)?.lock().device.view())
     }
 
     pub(crate) fn points(&self, id: &str, query: &PointsQuery) -> Result<PointsView, Problem> {
-        let points = &self.slot(id)?.points;
+        let slot = self.device(id)?;
         Ok(match &query.signal {
-            Some(signals) => points.carrying(&signals.split(',').collect::<Vec<_>>()),
-            None => points.clone(),
+            Some(signals) => slot.points.carrying(&signals.split(',').collect::<Vec<_>>()),
+            None => slot.points.clone(),
         })
     }
 
     pub(crate) fn values(&self, id: &str, query: &ValuesQuery) -> Result<Vec<ValueView>, Problem> {
-        let slot = self.slot(id)?;
+        let slot = self.device(id)?;
         let live = slot.lock();
         let profile = live.device.site().profile;
         let group = match &query.group {
@@ -215,47 +229,49 @@ impl Hub {
     }
 
     pub(crate) fn joined(&self, id: &str) -> Result<Vec<JoinedView>, Problem> {
-        Ok(self.slot(id)?.lock().device.joined_views())
+        Ok(self.device(id)?.lock().device.joined_views())
     }
 
     pub(crate) fn alarms(&self) -> Vec<AlarmView> {
         let mut alarms: Vec<AlarmView> =
-            self.devices.iter().flat_map(|slot| slot.lock().device.alarm_views()).collect();
+            self.table().devices.iter().flat_map(|slot| slot.lock().device.alarm_views()).collect();
         gravest_first(&mut alarms);
         alarms
     }
 
     pub(crate) fn wires(&self) -> Vec<WireView> {
-        self.wires.iter().map(|(id, link)| wires::view(id, link)).collect()
+        self.table().wires.iter().map(|(id, link)| wires::view(id, link)).collect()
     }
 
     pub(crate) fn wire(&self, id: &str) -> Result<WireDetailView, Problem> {
-        let (id, link) = self.wires.iter().find(|wire| wire.0 == id).ok_or_else(|| self.unknown_wire(id))?;
-        let on_it = self.devices.iter().filter(|slot| slot.lock().device.wire() == id);
-        let devices: Vec<(SiteDevice, Overview)> = on_it
-            .map(|slot| {
-                let plan = slot.plan.lock().unwrap_or_else(PoisonError::into_inner).clone();
-                (slot.lock().device.site().clone(), plan)
+        let table = self.table();
+        let (id, link) = table.wire(id)?;
+        let devices: Vec<(SiteDevice, Overview)> = table
+            .devices
+            .iter()
+            .filter_map(|slot| {
+                let live = slot.lock();
+                (live.device.wire() == id).then(|| (live.device.site().clone(), slot.plan()))
             })
             .collect();
         Ok(wires::detail(id, link, &devices))
     }
 
-    /// Index of a device.
-    pub(crate) fn index(&self, id: &str) -> Result<usize, Problem> {
-        self.devices.iter().position(|slot| slot.id == id).ok_or_else(|| self.unknown(id))
+    /// A device by its id.
+    pub(crate) fn device(&self, id: &str) -> Result<Arc<Slot>, Problem> {
+        self.table().device(id).map(Arc::clone)
     }
 
-    /// Everything as it stands, and how to go on from there: the events that come after it.
-    pub(crate) fn snapshot(&self, only: Option<usize>) -> (SnapshotEvent, Vec<u64>) {
-        let mut snapshot = SnapshotEvent { site: self.info.clone(), devices: Vec::new(), alarms: Vec::new() };
-        let mut sequences = vec![0; self.devices.len()];
-        for (index, slot) in self.devices.iter().enumerate() {
-            if only.is_some_and(|only| only != index) {
+    /// Everything as it stands, and how to go on from there: the events that come after it, by device.
+    pub(crate) fn snapshot(&self, only: Option<u64>) -> (SnapshotEvent, HashMap<u64, u64>) {
+        let mut snapshot = SnapshotEvent { site: self.info(), devices: Vec::new(), alarms: Vec::new() };
+        let mut sequences = HashMap::new();
+        for slot in &self.table().devices {
+            if only.is_some_and(|only| only != slot.key) {
                 continue;
             }
             let live = slot.lock();
-            sequences[index] = live.sequence;
+            sequences.insert(slot.key, live.sequence);
             let device = DeviceSnapshot {
                 device: live.device.view(),
                 values: live.device.values(),
@@ -270,28 +286,6 @@ impl Hub {
 
     pub(crate) fn subscribe(&self) -> broadcast::Receiver<Arc<Event>> {
         self.events.subscribe()
-    }
-
-    fn slot(&self, id: &str) -> Result<&Slot, Problem> {
-        Ok(&self.devices[self.index(id)?])
-    }
-
-    fn unknown_wire(&self, id: &str) -> Problem {
-        let known: Vec<&str> = self.wires.iter().map(|(id, _)| id.as_str()).collect();
-        let detail = match known.as_slice() {
-            [] => format!("there is no wire {id}: this site has none"),
-            known => format!("there is no wire {id}; this site has {}", known.join(", ")),
-        };
-        Problem::new(StatusCode::NOT_FOUND, detail)
-    }
-
-    fn unknown(&self, id: &str) -> Problem {
-        let known: Vec<&str> = self.devices.iter().map(|slot| slot.id.as_str()).collect();
-        let detail = match known.as_slice() {
-            [] => format!("there is no device {id}: this site has none"),
-            known => format!("there is no device {id}; this site has {}", known.join(", ")),
-        };
-        Problem::new(StatusCode::NOT_FOUND, detail)
     }
 }
 
@@ -350,10 +344,11 @@ mod tests {
     #[test]
     fn alarms_of_all_devices_are_listed_the_gravest_first() {
         let hub = hub(&["gen1", "gen2", "gen3"], stop::channel().1);
+        let slots = &hub.table().devices;
         let alarms = |shutdowns, warnings| answered(Rate::Fast, &[(110, &[shutdowns, warnings])]);
-        hub.finish(0, alarms(0, 1));
-        hub.finish(1, alarms(1, 1));
-        hub.finish(2, alarms(0, 0));
+        hub.finish(&slots[0], alarms(0, 1));
+        hub.finish(&slots[1], alarms(1, 1));
+        hub.finish(&slots[2], alarms(0, 0));
         let listed = |alarms: &[AlarmView]| {
             alarms.iter().map(|alarm| (alarm.device.clone(), alarm.point.clone())).collect::<Vec<_>>()
         };
@@ -361,19 +356,21 @@ mod tests {
         let expected = expected.map(|(device, point)| (device.to_owned(), point.to_owned()));
         assert_eq!(listed(&hub.alarms()), expected);
         assert_eq!(listed(&hub.snapshot(None).0.alarms), expected);
-        assert_eq!(listed(&hub.snapshot(Some(0)).0.alarms), expected[1..2]);
+        assert_eq!(listed(&hub.snapshot(Some(slots[0].key)).0.alarms), expected[1..2]);
     }
 
     #[tokio::test]
     async fn a_round_of_two_rates_is_told_once_for_each() {
         let hub = hub(&["gen1"], stop::channel().1);
+        let slots = &hub.table().devices;
         let mut events = hub.subscribe();
         let registers = [0, 1, 0, 0, 2302, 0, 215, 0, 1234, 0, 0, 0];
         let both = Rates::from_iter([Rate::Fast, Rate::Slow]);
         // Of the curve a part came along, which is none; the identity is whole.
-        hub.finish(0, answered(both, &[(100, &registers), (126, &[9, 0, 0, 0, 2])]));
+        hub.finish(&slots[0], answered(both, &[(100, &registers), (126, &[9, 0, 0, 0, 2])]));
         let event = events.recv().await.unwrap();
-        let told: Vec<serde_json::Value> = std::str::from_utf8(&event.frames)
+        let Event::Device { frames, .. } = &*event else { panic!("of a device: {event:?}") };
+        let told: Vec<serde_json::Value> = std::str::from_utf8(frames)
             .unwrap()
             .lines()
             .filter_map(|line| serde_json::from_str(line.strip_prefix("data: ")?).ok())

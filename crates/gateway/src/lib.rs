@@ -5,7 +5,7 @@
 //! The way of a reading: `poller` asks the wire by `schedule` and `poll_plan`; a finished round goes into `device`,
 //! which keeps registers, values, quality and `alarms` and says what changed; `hub` holds all devices and tells the
 //! readers of `events`. Everything that decides is pure and takes the time as an argument; only `poller`, `events`,
-//! `server` and `gateway` wait for anything.
+//! `server` and `gateway` wait for anything. `running` is what of a site runs, `table` what the API sees of it.
 
 mod alarms;
 pub mod api;
@@ -15,15 +15,18 @@ mod failure;
 mod gateway;
 mod hub;
 mod joined;
+mod looks;
 mod page;
 mod patience;
 mod poll_plan;
 mod poller;
 mod rates;
+mod running;
 mod schedule;
 mod server;
 mod site;
 mod stop;
+mod table;
 #[cfg(test)]
 mod testing;
 mod wires;

@@ -14,16 +14,17 @@ use crate::poll_plan::PollPlan;
 use crate::rates::{POLLED, Rates};
 use crate::schedule::Schedule;
 use crate::site::SiteDevice;
+use crate::stop::Stop;
+use crate::table::Slot;
 use crate::wires;
 
 /// So many reads in a row without an answer, each with its retries, and the device counts as silent.
 const SILENT_READS: u32 = 2;
 
-/// Polls one device until the gateway ends.
+/// Polls one device until it is told to stop.
 pub(crate) struct Poller {
     hub: Arc<Hub>,
-    /// Index of the device in the hub.
-    device: usize,
+    slot: Arc<Slot>,
     site: SiteDevice,
     link: Link,
     wire: watch::Receiver<WireState>,
@@ -40,17 +41,17 @@ pub(crate) struct PolledWire {
 }
 
 impl Poller {
-    pub(crate) fn new(hub: Arc<Hub>, device: usize, site: SiteDevice, wire: PolledWire) -> Self {
+    pub(crate) fn new(hub: Arc<Hub>, slot: Arc<Slot>, wire: PolledWire) -> Self {
         let PolledWire { link, cost } = wire;
+        let site = slot.lock().device.site().clone();
         let plan = PollPlan::new(site.profile, cost);
         let link = link
             .with_short_answers(site.profile.wire.over_read == OverRead::Truncate)
             .with_spacing(wires::spacing(site.profile));
-        Self { hub, device, wire: link.state(), site, link, plan, wire_failed: false }
+        Self { hub, slot, wire: link.state(), site, link, plan, wire_failed: false }
     }
 
-    pub(crate) async fn run(mut self) {
-        let mut stop = self.hub.stop();
+    pub(crate) async fn run(mut self, mut stop: Stop) {
         tokio::select! {
             () = stop.requested() => {}
             () = self.poll() => {}
@@ -61,7 +62,7 @@ impl Poller {
         let Some(probe) = POLLED.into_iter().find(|rate| self.plan.has(*rate)) else { return };
         let mut schedule = Schedule::new(self.site.poll, self.hub.now());
         let mut answered = false;
-        self.hub.planned(self.device, self.plan.overview());
+        self.slot.planned(self.plan.overview());
         loop {
             let due = self.next(&mut schedule).await;
             let rates = if schedule.is_silent() { probe.into() } else { due };
@@ -88,7 +89,7 @@ impl Poller {
                     answered = true;
                 }
             }
-            self.hub.finish(self.device, round);
+            self.hub.finish(&self.slot, round);
         }
     }
 
@@ -176,7 +177,7 @@ impl Poller {
             };
             if failure.is_illegal_address() {
                 let parts = self.plan.refused(rates, read, self.hub.now());
-                self.hub.planned(self.device, self.plan.overview());
+                self.slot.planned(self.plan.overview());
                 if !parts.is_empty() {
                     waiting.extend(parts.into_iter().rev());
                     continue;

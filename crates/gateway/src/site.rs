@@ -53,6 +53,17 @@ pub struct SiteWire {
     pub spacing: Option<Duration>,
 }
 
+impl SiteWire {
+    /// Whether the two are one line, used in one way, so that it need not be opened anew.
+    pub(crate) fn is_same_line(&self, other: &Self) -> bool {
+        let Self { id, endpoint, timeout, spacing } = self;
+        *id == other.id
+            && *endpoint == other.endpoint
+            && *timeout == other.timeout
+            && *spacing == other.spacing
+    }
+}
+
 /// One device of a site.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -71,6 +82,19 @@ pub struct SiteDevice {
     pub word_order: WordOrder,
     /// How often it is polled.
     pub poll: Poll,
+}
+
+impl SiteDevice {
+    /// Whether the two are one device, read in one way. Which wire it is on is not looked at.
+    pub(crate) fn is_same_device(&self, other: &Self) -> bool {
+        let Self { id, name, profile, wire: _, unit, word_order, poll } = self;
+        *id == other.id
+            && *name == other.name
+            && std::ptr::eq(*profile, other.profile)
+            && *unit == other.unit
+            && *word_order == other.word_order
+            && *poll == other.poll
+    }
 }
 
 /// How often a device is polled.

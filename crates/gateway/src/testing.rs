@@ -7,13 +7,14 @@ use busbar_link::{Cause, LinkError, Outage};
 use busbar_profile::plan::Read;
 use busbar_profile::{Profile, Rate};
 
-use crate::api::types::Time;
+use crate::api::types::{DiagramView, Time};
 use crate::device::{Device, Round};
 use crate::failure::Failure;
 use crate::hub::Hub;
 use crate::rates::Rates;
 use crate::site::{Poll, SiteDevice};
 use crate::stop::Stop;
+use crate::table::{Slot, Table};
 
 const PROFILE: &str = r#"
 format = 1
@@ -176,6 +177,17 @@ pub(crate) fn ts(seconds: i64) -> Time {
 
 /// A site of small devices on no wire at all.
 pub(crate) fn hub(devices: &[&str], stop: Stop) -> Hub {
-    let devices = devices.iter().map(|id| Device::new(site_device(id), "w1".to_owned())).collect();
-    Hub::new("Test".to_owned(), devices, Vec::new(), stop)
+    Hub::new(table(devices), stop)
+}
+
+/// The same, before it is live.
+pub(crate) fn table(devices: &[&str]) -> Table {
+    let slot = |id: &&str| Arc::new(Slot::new(Device::new(site_device(id), "w1".to_owned())));
+    Table {
+        name: "Test".to_owned(),
+        time_zone: None,
+        devices: devices.iter().map(slot).collect(),
+        wires: Vec::new(),
+        diagram: DiagramView::default(),
+    }
 }

@@ -33,8 +33,8 @@ fn options(wire: &SiteWire, profiles: &[&Profile]) -> Options {
         timeout: wire.timeout.or(longest.map(ms)).unwrap_or(defaults.timeout),
         // The pauses of a device are for the others on the wire to use: they are kept by unit.
         spacing: wire.spacing.unwrap_or(defaults.spacing),
-        // Every device has one read waiting at most.
-        queue: defaults.queue.max(profiles.len() + 16),
+        // Every device has one read waiting at most, and a reload may add devices.
+        queue: defaults.queue.max(256 + 16),
         ..defaults
     }
 }

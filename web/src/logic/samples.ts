@@ -63,6 +63,9 @@ export function device(id: string, rest: Partial<DeviceView> = {}): DeviceView {
     alarms_fault: null,
     alarms: { shutdown: 0, load_dump: 0, trip: 0, warning: 0, indication: 0 },
     last_seen: stamp(0),
+    identity: { verdict: 'confirmed', detail: 'it says that it is a D-500', checked: stamp(0) },
+    desired: null,
+    nameplate: { power_kw: null, tank_l: null, battery_v: null },
     ...rest,
   }
 }
@@ -76,7 +79,14 @@ type Devices = (Omit<Snapshot['devices'][number], 'joined'> & Partial<Snapshot['
 
 export function snapshot(devices: Devices, alarms: AlarmView[] = [], started = 0): Snapshot {
   return {
-    site: { name: 'North hospital', version: '0.1.0', started: stamp(started) },
+    site: {
+      name: 'North hospital',
+      version: '0.1.0',
+      started: stamp(started),
+      time_zone: null,
+      revision: 1,
+      config: { loaded: stamp(started), refused: null },
+    },
     devices: devices.map((device) => ({ joined: [], ...device })),
     alarms,
   }

@@ -232,7 +232,7 @@ async fn stream(
     query: Result<Query<EventsQuery>, QueryRejection>,
 ) -> Result<Response, Problem> {
     let Query(query) = query.map_err(bad_query)?;
-    let only = query.device.map(|device| hub.index(&device)).transpose()?;
+    let only = query.device.map(|device| hub.device(&device)).transpose()?.map(|slot| slot.key);
     Ok(events::response(hub, only))
 }
 

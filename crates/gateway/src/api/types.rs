@@ -3,6 +3,7 @@
 //! These types are the contract of the API and nothing else: they are built from the live state, sent, and
 //! forgotten. `openapi.json` is generated from them, and the page's own types from that file.
 
+mod diagram;
 mod wire;
 
 use std::borrow::Cow;
@@ -13,6 +14,7 @@ use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema,
 use utoipa::openapi::{RefOr, schema};
 use utoipa::{PartialSchema, ToSchema};
 
+pub use self::diagram::{ConnectionView, DiagramView, NodeView};
 pub use self::wire::{
     ExceptionCount, LatencyBucket, LatencyView, PlanView, PlannedRead, PlannedRound, UnitState, UnitView,
     WireDetailView, WireState, WireStatistics, WireTime, WireView,
@@ -29,21 +31,46 @@ pub struct SiteInfo {
     pub version: String,
     /// When this gateway started.
     pub started: Time,
+    /// The IANA time zone of the site; null when the site file gives none.
+    #[schema(required, examples("Europe/Berlin"))]
+    pub time_zone: Option<String>,
+    /// Counts the site files that were accepted: 1 at start, one more after each reload.
+    #[schema(examples(1))]
+    pub revision: u64,
+    /// Which site file runs.
+    pub config: ConfigView,
 }
 
-/// The site and every device on it.
+/// The site file that runs, and the one that was refused.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ConfigView {
+    /// When the one that runs was accepted.
+    pub loaded: Time,
+    /// The newer one that was refused, so that the one before it goes on; null when there is none.
+    #[schema(required)]
+    pub refused: Option<RefusedView>,
+}
+
+/// A site file that was refused.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct RefusedView {
+    /// When.
+    pub at: Time,
+    /// What is wrong with it.
+    #[schema(examples("site.toml:14:1: the wire `line` is not defined"))]
+    pub reason: String,
+}
+
+/// The site, how it is connected, and every device on it.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct SiteView {
-    /// The name the site file gives.
-    #[schema(examples("North hospital"))]
-    pub name: String,
-    /// Version of the gateway.
-    #[schema(examples("0.1.0"))]
-    pub version: String,
-    /// When this gateway started.
-    pub started: Time,
+    /// The site.
+    #[serde(flatten)]
+    pub site: SiteInfo,
     /// The devices in the order of the site file.
     pub devices: Vec<DeviceView>,
+    /// How it is connected.
+    pub diagram: DiagramView,
 }
 
 /// One controller as it stands now.
@@ -99,6 +126,66 @@ pub struct DeviceView {
     /// When it last answered; null before the first answer.
     #[schema(required)]
     pub last_seen: Option<Time>,
+    /// Whether it is the device that the site file says.
+    pub identity: IdentityView,
+    /// What the site file wants of it, apart from what it is; null when the site file wants nothing.
+    #[schema(required)]
+    pub desired: Option<DesiredView>,
+    /// What the site file says of the machine.
+    pub nameplate: NameplateView,
+}
+
+/// Whether the device on the wire is the one that the site file says.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct IdentityView {
+    /// What is known.
+    pub verdict: Identity,
+    /// Why, in one sentence; null while nothing is known.
+    #[schema(required, examples("it says that it is a D-500"))]
+    pub detail: Option<String>,
+    /// When it was last asked and answered; null before that.
+    #[schema(required)]
+    pub checked: Option<Time>,
+}
+
+/// What is known of a device's identity.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Identity {
+    /// Not asked yet, or not answered since the connection was made anew.
+    #[default]
+    Unknown,
+    /// It answers what only its profile documents, but names no model that the profile knows.
+    Plausible,
+    /// It names a model of its profile, and the one that the site file wants.
+    Confirmed,
+    /// It is another device: nothing of it is taken but its identity.
+    Wrong,
+}
+
+/// What the site file wants of a device. The gateway does nothing about it; a person does.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct DesiredView {
+    /// The mode that it should be in.
+    #[schema(examples("auto"))]
+    pub mode: String,
+    /// Whether it is; null while that is not known.
+    #[schema(required)]
+    pub met: Option<bool>,
+}
+
+/// What stands on the machine and what belongs to it. Null where the site file does not say.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ToSchema)]
+pub struct NameplateView {
+    /// Power in kW.
+    #[schema(required, examples(400.0))]
+    pub power_kw: Option<f64>,
+    /// Fuel that the tank holds in litres.
+    #[schema(required, examples(900.0))]
+    pub tank_l: Option<f64>,
+    /// Nominal voltage of the starter battery.
+    #[schema(required, examples(24.0))]
+    pub battery_v: Option<f64>,
 }
 
 /// What kind of controller a device is.

@@ -1,0 +1,114 @@
+//! What runs of a site: its open wires and the pollers of its devices, and what a reload keeps of them.
+
+use std::sync::Arc;
+
+use busbar_link::{Link, OpenError};
+use tokio::task::JoinSet;
+
+use crate::api::types::DiagramView;
+use crate::device::Device;
+use crate::hub::Hub;
+use crate::poller::{PolledWire, Poller};
+use crate::site::{Site, SiteDevice, SiteWire};
+use crate::stop::{self, Announcer};
+use crate::table::{Slot, Table};
+use crate::wires;
+
+/// The wires and devices that run.
+#[derive(Debug, Default)]
+pub(crate) struct Running {
+    wires: Vec<RunningWire>,
+    devices: Vec<RunningDevice>,
+}
+
+#[derive(Debug)]
+struct RunningWire {
+    site: SiteWire,
+    link: Link,
+}
+
+#[derive(Debug)]
+struct RunningDevice {
+    /// Which of the wires it is on.
+    wire: usize,
+    site: SiteDevice,
+    slot: Arc<Slot>,
+    /// Ends its poller, dropped as well; none until it is polled.
+    poller: Option<Announcer>,
+}
+
+/// A wire that cannot be opened.
+#[derive(Debug)]
+pub(crate) struct Unopened {
+    pub(crate) wire: String,
+    pub(crate) source: OpenError,
+}
+
+impl Running {
+    /// What is to run for a site, taking over from `self` what the site did not change: the wire stays open and the
+    /// device keeps its values. `self` still runs as it did.
+    pub(crate) fn next(&self, site: &Site) -> Result<Self, Unopened> {
+        let wires: Vec<RunningWire> = site
+            .wires
+            .iter()
+            .enumerate()
+            .map(|(index, wire)| self.wire(site, index, wire))
+            .collect::<Result<_, _>>()?;
+        let devices = site.devices.iter().map(|device| self.device(site, device)).collect();
+        Ok(Self { wires, devices })
+    }
+
+    fn wire(&self, site: &Site, index: usize, wire: &SiteWire) -> Result<RunningWire, Unopened> {
+        let kept = self.wires.iter().find(|running| running.site.is_same_line(wire));
+        let link = match kept {
+            Some(running) => running.link.clone(),
+            None => {
+                wires::open(site, index, wire).map_err(|source| Unopened { wire: wire.id.clone(), source })?
+            }
+        };
+        Ok(RunningWire { site: wire.clone(), link })
+    }
+
+    fn device(&self, site: &Site, device: &SiteDevice) -> RunningDevice {
+        let wire = &site.wires[device.wire];
+        let kept = self.devices.iter().find(|running| {
+            running.site.is_same_device(device) && self.wires[running.wire].site.is_same_line(wire)
+        });
+        let slot = match kept {
+            Some(running) => Arc::clone(&running.slot),
+            None => Arc::new(Slot::new(Device::new(device.clone(), wire.id.clone()))),
+        };
+        RunningDevice { wire: device.wire, site: device.clone(), slot, poller: None }
+    }
+
+    /// The same as the API has it.
+    pub(crate) fn table(&self, site: &Site) -> Table {
+        Table {
+            name: site.name.clone(),
+            time_zone: None,
+            devices: self.devices.iter().map(|device| Arc::clone(&device.slot)).collect(),
+            wires: self.wires.iter().map(|wire| (wire.site.id.clone(), wire.link.clone())).collect(),
+            diagram: DiagramView::default(),
+        }
+    }
+
+    /// Goes on with the pollers of `before` and starts those that are missing; those that have no device any more end.
+    pub(crate) fn poll(&mut self, mut before: Self, hub: &Arc<Hub>, tasks: &mut JoinSet<()>) {
+        for device in &mut self.devices {
+            let polled = before.devices.iter_mut().find(|running| running.slot.key == device.slot.key);
+            device.poller = polled.and_then(|running| running.poller.take());
+        }
+        // Ends the pollers that are left, and with the last user of a wire that wire.
+        drop(before);
+        for device in self.devices.iter_mut().filter(|device| device.poller.is_none()) {
+            let RunningWire { site, link } = &self.wires[device.wire];
+            let wire = PolledWire {
+                link: wires::for_polling(link),
+                cost: wires::cost(&site.endpoint, device.site.profile),
+            };
+            let (announcer, stop) = stop::channel();
+            tasks.spawn(Poller::new(Arc::clone(hub), Arc::clone(&device.slot), wire).run(stop));
+            device.poller = Some(announcer);
+        }
+    }
+}
