@@ -39,7 +39,7 @@ export interface Layout {
 /** The side of a symbol, and the width of a node that has one connection at a side. */
 export const SYMBOL = 40
 /** The room of the words. */
-export const TEXT = 116
+export const TEXT = 120
 export const ROW = 60
 export const GAP = 14
 /** Between two lines that leave a node side by side. */

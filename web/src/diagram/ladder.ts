@@ -1,10 +1,14 @@
 // The narrow layout: a row for each node, the lines beside them. It fits any site.
-import { MARGIN, ROW, SYMBOL, TEXT, type Layout, type Line, type XY } from './geometry'
+import { MARGIN, ROW, SYMBOL, type Layout, type Line, type XY } from './geometry'
 import { layersOf } from './layers'
 import type { Diagram } from './types'
 
 /** Between two upright lines: a breaker's contacts have room. */
 const LANE = 20
+/** Words need that much, however many lines there are. */
+const LEAST = 100
+/** Longer lines of words are hard to follow back to their symbol. */
+const MOST = 320
 
 interface Run {
   connection: number
@@ -56,7 +60,7 @@ export function ladder(diagram: Diagram, width: number): Layout {
       breaker: diagram.connections[run.connection]?.breaker == null ? undefined : [x, y],
     }
   })
-  const words = Math.max(TEXT, width - left - SYMBOL - MARGIN)
+  const words = Math.min(MOST, Math.max(LEAST, width - left - SYMBOL - MARGIN))
   return {
     width: left + SYMBOL + words + MARGIN,
     height: order.length * ROW + 2 * MARGIN,

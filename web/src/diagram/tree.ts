@@ -65,12 +65,13 @@ function symbolsOf({ nodes }: Diagram, { edges, of }: Layers): Map<string, numbe
   return new Map(
     nodes.map(({ id, kind }) => {
       const own = edges.filter(({ a, b }) => a === id || b === id)
-      const layer = of.get(id) ?? 0
       const below = own.filter((edge) => sideOf(edge, id, of) === 'bottom').length
       const most = Math.max(1, below, own.length - below)
-      const beside = own.filter(({ a, b }) => of.get(a) === layer && of.get(b) === layer).length
-      const pitched = Math.max(1, Math.max(below, own.length - below) - beside)
-      const wide = kind === 'bus' ? (pitched - 1) * PITCH : 0
+      const level = of.get(id) ?? 0
+      const beside = own.filter(({ a, b }) => of.get(a) === of.get(b)).length
+      const straight = level === 0 ? below - beside : Math.max(below, own.length - below - beside)
+      // A line to the next bus leaves at an end, past those that go straight up and down.
+      const wide = kind === 'bus' ? Math.max(0, straight - 1) * PITCH + 2 * beside * PORT : 0
       return [id, Math.max(SYMBOL + wide, (most - 1) * PORT + SYMBOL)]
     }),
   )
@@ -121,11 +122,17 @@ function routesOf(
   const pins = new Map<Edge, Pin[]>(edges.map((edge) => [edge, []]))
   const symbol = (id: string) => symbols.get(id) ?? SYMBOL
   const middle = (id: string) => (xs.get(id) ?? 0) + symbol(id) / 2
-  for (const id of xs.keys()) {
+  const goalOf = (edge: Edge, id: string) => {
+    const other = edge.a === id ? edge.b : edge.a
+    return pins.get(edge)?.find(({ node }) => node === other)?.x ?? middle(other)
+  }
+  // The taps of a bus are where the others' lines are, so that these stay straight.
+  const order = [...xs.keys()].sort((a, b) => symbol(a) - symbol(b))
+  for (const id of order) {
     for (const side of ['top', 'bottom'] as const) {
       const own = edges
         .filter((edge) => (edge.a === id || edge.b === id) && sideOf(edge, id, of) === side)
-        .map((edge) => ({ edge, goal: middle(edge.a === id ? edge.b : edge.a) }))
+        .map((edge) => ({ edge, goal: goalOf(edge, id) }))
         .sort((a, b) => a.goal - b.goal)
       const from = (xs.get(id) ?? 0) + SYMBOL / 2
       const to = from + symbol(id) - SYMBOL

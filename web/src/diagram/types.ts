@@ -1,25 +1,12 @@
 // How a site is connected, as the gateway tells it, and what the diagram needs to know of the values.
+import type { components } from '../api'
 import type { Look } from '../logic/quality'
 
-export type NodeKind = 'mains' | 'genset' | 'bus' | 'load' | 'compressor'
+type Schemas = components['schemas']
 
-export interface DiagramNode {
-  id: string
-  kind: NodeKind
-  name: string
-  /** The device that measures it; null where none does. */
-  device: string | null
-  /** Which object of that device's signals describes it. */
-  signals: string | null
-}
-
-export interface Connection {
-  from: string
-  to: string
-  device: string | null
-  /** The signal that tells its breaker's position; null for a plain line. */
-  breaker: string | null
-}
+export type DiagramNode = Schemas['NodeView']
+export type NodeKind = DiagramNode['kind']
+export type Connection = Schemas['ConnectionView']
 
 export interface Diagram {
   nodes: readonly DiagramNode[]
