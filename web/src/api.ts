@@ -122,10 +122,16 @@ export interface paths {
         };
         /**
          * What happens, as it happens: server-sent events.
-         * @description First `snapshot` (`SnapshotEvent`); then `values` (`ValuesEvent`) once a finished poll round of a device,
-         *     `device` (`DeviceView`) when a device changed and `alarms` (`AlarmsEvent`) when its active alarms did. A comment
-         *     keeps the connection alive each 15 seconds. A reader that falls behind gets a new `snapshot` in place of
-         *     the events it missed.
+         * @description First `snapshot` (`SnapshotEvent`), then one `state` (`StateEvent`) for each of its devices; from then on `values`
+         *     (`ValuesEvent`) once a poll round of a device is finished, `device` (`DeviceView`) when a device changed, `alarms`
+         *     (`AlarmsEvent`) when its active alarms did, and `site` (`SiteInfo`) when a site file was accepted or refused. Other
+         *     devices or wires begin with `snapshot` again. A round that brought nothing that is asked for is told of with
+         *     nothing in it as long as something that is asked for is read at its rate.
+         *
+         *     The last event of a snapshot and all later ones have an id. A reader that comes back with one gets `resumed`
+         *     (`ResumedEvent`) and what it missed, or a `snapshot` where that is not known any more. A reader that falls behind
+         *     gets `device`, `alarms` and `state` of each device in place of the events it missed. A comment keeps the connection
+         *     alive each 15 seconds. The stream is compressed with gzip for those who accept it.
          */
         get: operations["events"];
         put?: never;
@@ -211,8 +217,50 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Whether the gateway runs. */
+        /** Whether the gateway lives: requests are answered and the age of values is looked at. */
         get: operations["healthz"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/metrics": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Values by signal and device, and what went over the wires: OpenMetrics text.
+         * @description A value that is not good now has no sample. Names are `busbar_`, the signal with `_` for dots, and its unit in small
+         *     letters: `busbar_genset_power_active_kw{device="gen1"}`.
+         */
+        get: operations["metrics"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/readyz": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Whether the gateway has something to show: each device has given its first values, or it is known why it cannot.
+         * @description Once ready it stays so. That a device dies later, or that a newer site file adds one, takes no gateway out of
+         *     service: its page is where a person sees what is wrong.
+         */
+        get: operations["readyz"];
         put?: never;
         post?: never;
         delete?: never;
@@ -378,15 +426,6 @@ export interface components {
              * @example auto
              */
             mode: string;
-        };
-        /** @description One device in a snapshot. */
-        DeviceSnapshot: {
-            /** @description The device. */
-            device: components["schemas"]["DeviceView"];
-            /** @description What several of its points make up. */
-            joined: components["schemas"]["JoinedView"][];
-            /** @description Its values, in address order. */
-            values: components["schemas"]["ValueView"][];
         };
         /** @description One controller as it stands now. */
         DeviceView: {
@@ -882,6 +921,8 @@ export interface components {
              */
             reason: string;
         };
+        /** @description `event: resumed`: what the reader has still holds, and what it missed follows. */
+        ResumedEvent: Record<string, never>;
         /** @description The site, without its devices. */
         SiteInfo: {
             /** @description Which site file runs. */
@@ -917,14 +958,35 @@ export interface components {
             /** @description How it is connected. */
             diagram: components["schemas"]["DiagramView"];
         };
-        /** @description `event: snapshot`: everything, sent first and again after a reader fell behind. */
+        /**
+         * @description `event: snapshot`: the site and its devices. A `state` of each of them follows.
+         *
+         *     It comes first, and again when the site file in force has other devices or wires.
+         */
         SnapshotEvent: {
             /** @description Their active alarms, the gravest first. */
             alarms: components["schemas"]["AlarmView"][];
             /** @description The devices asked for, in the order of the site file. */
-            devices: components["schemas"]["DeviceSnapshot"][];
+            devices: components["schemas"]["DeviceView"][];
             /** @description The site. */
             site: components["schemas"]["SiteInfo"];
+        };
+        /**
+         * @description `event: state`: all values asked for of one device, in place of those before.
+         *
+         *     One of each device follows a `snapshot`. A reader that falls behind gets a `device`, an `alarms` and a `state` of
+         *     each device in place of the events it missed.
+         */
+        StateEvent: {
+            /**
+             * @description Id of the device.
+             * @example gen1
+             */
+            device: string;
+            /** @description What several of its points make up. */
+            joined: components["schemas"]["JoinedView"][];
+            /** @description Its values, in address order. */
+            values: components["schemas"]["ValueView"][];
         };
         /** @description What a device is doing. */
         StateView: {
@@ -1079,14 +1141,14 @@ export interface components {
          *     Every point of that device and rate whose quality is `good` was read at `ts`, changed or not.
          */
         ValuesEvent: {
-            /** @description The points whose value or quality changed. */
+            /** @description The points whose value or quality changed, of those asked for. */
             changed: components["schemas"]["ValueView"][];
             /**
              * @description Id of the device.
              * @example gen1
              */
             device: string;
-            /** @description The joined signals whose value or quality changed. */
+            /** @description The joined signals whose value or quality changed, of those asked for. */
             joined: components["schemas"]["JoinedView"][];
             /** @description Which of its points were read. */
             rate: components["schemas"]["Rate"];
@@ -1274,7 +1336,13 @@ export interface operations {
     alarms: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path?: never;
             cookie?: never;
         };
@@ -1283,10 +1351,75 @@ export interface operations {
             /** @description The active alarms */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["AlarmView"][];
+                };
+            };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request has no Host header, more than one, or a body that is none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
         };
@@ -1294,7 +1427,13 @@ export interface operations {
     devices: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path?: never;
             cookie?: never;
         };
@@ -1303,10 +1442,75 @@ export interface operations {
             /** @description The devices */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["DeviceView"][];
+                };
+            };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request has no Host header, more than one, or a body that is none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
         };
@@ -1314,7 +1518,13 @@ export interface operations {
     device: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path: {
                 /**
                  * @description Id of the device
@@ -1329,14 +1539,79 @@ export interface operations {
             /** @description The device */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["DeviceView"];
                 };
             };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request has no Host header, more than one, or a body that is none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description There is no such device */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -1349,7 +1624,13 @@ export interface operations {
     joined: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path: {
                 /**
                  * @description Id of the device
@@ -1364,11 +1645,22 @@ export interface operations {
             /** @description Its joined signals */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["JoinedView"][];
                 };
+            };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description The id is no text */
             400: {
@@ -1388,6 +1680,51 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
         };
     };
     points: {
@@ -1400,7 +1737,13 @@ export interface operations {
                  */
                 signal?: string;
             };
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path: {
                 /**
                  * @description Id of the device
@@ -1415,11 +1758,22 @@ export interface operations {
             /** @description Its points, in groups */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["PointsView"];
                 };
+            };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description The query is not understood */
             400: {
@@ -1432,6 +1786,51 @@ export interface operations {
             };
             /** @description There is no such device */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -1455,7 +1854,13 @@ export interface operations {
                  */
                 point?: string;
             };
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path: {
                 /**
                  * @description Id of the device
@@ -1470,11 +1875,22 @@ export interface operations {
             /** @description Its values */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["ValueView"][];
                 };
+            };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description The query names what the device does not have */
             400: {
@@ -1494,18 +1910,83 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
         };
     };
     events: {
         parameters: {
             query?: {
                 /**
-                 * @description Only this device.
-                 * @example gen1
+                 * @description Only these devices: ids with commas between them.
+                 * @example gen1,gen2
                  */
                 device?: string;
+                /**
+                 * @description Of the values only those of these groups: ids with commas between them. What is read on demand is read while a
+                 *     stream that names its group is open.
+                 * @example genset,display
+                 */
+                group?: string;
+                /**
+                 * @description Of the values only what carries one of these signals: ids of the shared vocabulary with commas between them.
+                 *     Those that a device does not have are passed over. With groups: what is in either.
+                 * @example genset.power.active,breaker.genset.closed
+                 */
+                signal?: string;
+                /**
+                 * @description Id of the last event that a reader has of this query: what it missed follows, if that is still known. The
+                 *     header `Last-Event-ID` counts before it.
+                 */
+                last_event_id?: string;
             };
-            header?: never;
+            header?: {
+                /** @description Id of the last event that the reader has */
+                "last-event-id"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -1520,7 +2001,7 @@ export interface operations {
                     "text/event-stream": string;
                 };
             };
-            /** @description The query is not understood */
+            /** @description The query is not understood, or names a group that there is not */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -1538,12 +2019,63 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
         };
     };
     document: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path?: never;
             cookie?: never;
         };
@@ -1552,10 +2084,75 @@ export interface operations {
             /** @description OpenAPI 3.1 */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": Record<string, never>;
+                };
+            };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request has no Host header, more than one, or a body that is none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
         };
@@ -1563,7 +2160,13 @@ export interface operations {
     site: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path?: never;
             cookie?: never;
         };
@@ -1572,10 +2175,75 @@ export interface operations {
             /** @description The site */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["SiteView"];
+                };
+            };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request has no Host header, more than one, or a body that is none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
         };
@@ -1583,7 +2251,13 @@ export interface operations {
     wires: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path?: never;
             cookie?: never;
         };
@@ -1592,10 +2266,75 @@ export interface operations {
             /** @description The wires */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["WireView"][];
+                };
+            };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request has no Host header, more than one, or a body that is none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
         };
@@ -1603,7 +2342,13 @@ export interface operations {
     wire: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /**
+                 * @description Entity tags of answers that the client has, with commas between them
+                 * @example W/"0123456789abcdef"
+                 */
+                "If-None-Match"?: string;
+            };
             path: {
                 /**
                  * @description Id of the wire
@@ -1618,11 +2363,22 @@ export interface operations {
             /** @description The wire */
             200: {
                 headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["WireDetailView"];
                 };
+            };
+            /** @description What the client has is what there is */
+            304: {
+                headers: {
+                    /** @description Changes with the content; weak, as the same content may be compressed or not */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description The id is no text */
             400: {
@@ -1642,6 +2398,51 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
         };
     };
     healthz: {
@@ -1653,7 +2454,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description It runs */
+            /** @description It lives */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -1661,6 +2462,209 @@ export interface operations {
                 content: {
                     /** @example ok */
                     "text/plain": string;
+                };
+            };
+            /** @description The request has no Host header, more than one, or a body that is none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description It hangs; start it again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    metrics: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description OpenMetrics 1.0 */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/openmetrics-text; version=1.0.0; charset=utf-8": string;
+                };
+            };
+            /** @description The request has no Host header, more than one, or a body that is none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too many clients ask at once; Retry-After says when to try again */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    readyz: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description It is ready */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    /** @example ready */
+                    "text/plain": string;
+                };
+            };
+            /** @description The request has no Host header, more than one, or a body that is none */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The address is too long */
+            414: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A gateway for one machine was asked under a name that is not its own */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There are too many header fields, or they are too long */
+            431: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The request met a bug in the gateway */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Some devices were not asked yet */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
         };

@@ -20,6 +20,8 @@ pub(crate) struct Table {
     pub(crate) name: String,
     /// The time zone the site file gives.
     pub(crate) time_zone: Option<String>,
+    /// Names besides those of this machine that a gateway for this machine alone answers to: a proxy passes them on.
+    pub(crate) hosts: Vec<String>,
     /// In the order of the site file.
     pub(crate) devices: Vec<Arc<Slot>>,
     /// In the order of the site file: id and wire.
@@ -78,6 +80,13 @@ impl Slot {
 }
 
 impl Table {
+    /// Whether it is the same devices and wires that make up another table.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let devices = |table: &Self| table.devices.iter().map(|slot| slot.key).collect::<Vec<_>>();
+        let wires = |table: &Self| table.wires.iter().map(|wire| wire.0.clone()).collect::<Vec<_>>();
+        devices(self) == devices(other) && wires(self) == wires(other)
+    }
+
     /// A device by its id.
     pub(crate) fn device(&self, id: &str) -> Result<&Arc<Slot>, Problem> {
         self.devices.iter().find(|slot| slot.id == id).ok_or_else(|| {

@@ -6,9 +6,12 @@
 mod bad_line;
 mod events;
 mod faults;
+mod hostile;
 mod http;
+mod identity;
 mod live;
 mod openapi;
+mod reload;
 mod sharing;
 mod start;
 mod support;
