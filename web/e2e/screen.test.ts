@@ -45,10 +45,7 @@ afterEach(() => {
   complaints = []
 })
 
-async function open(
-  hash: string,
-  [, viewport, colorScheme]: (typeof LOOKS)[number] = LOOKS[0],
-): Promise<Page> {
+async function open(hash: string, [, viewport, colorScheme]: Look): Promise<Page> {
   const page = await browser.newPage({ viewport, colorScheme })
   page.on('console', (message) => {
     if (message.type() === 'error' || message.type() === 'warning')

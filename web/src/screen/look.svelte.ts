@@ -1,15 +1,12 @@
 // A look at what is read only for those who look: a stream of its own, open while the screen is in sight.
+import type { components } from '../api'
 import { timeOf } from '../logic/format'
-import type { JoinedView, Rate, ValuesEvent, ValueView } from '../logic/types'
+import type { Rate, ValuesEvent, ValueView } from '../logic/types'
 import { Cell } from '../state/site.svelte'
 import { Stream, type Phase, type Source } from '../state/stream.svelte'
 import type { Looked } from './wanted'
 
-interface StateEvent {
-  device: string
-  values: ValueView[]
-  joined: JoinedView[]
-}
+type StateEvent = components['schemas']['StateEvent']
 
 export class Look {
   /** When the last round of each rate was read. */
