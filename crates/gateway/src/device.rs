@@ -474,6 +474,7 @@ impl Device {
     }
 
     /// Every value there is, in address order.
+    #[cfg(test)]
     pub(crate) fn values(&self) -> Vec<ValueView> {
         (0..self.points.len()).filter(|index| self.shows(*index)).map(|index| self.value(index)).collect()
     }

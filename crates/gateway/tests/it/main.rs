@@ -9,6 +9,7 @@ mod faults;
 mod http;
 mod live;
 mod openapi;
+mod readers;
 mod sharing;
 mod start;
 mod support;
