@@ -48,7 +48,7 @@ fn site(path: &Path) -> Result<Site, Failure> {
 }
 
 pub(super) async fn gateway(site: Site, listen: Option<SocketAddr>) -> Result<Gateway, Failure> {
-    busbar_gateway::start(site, Options { listen }).await.map_err(|error| match error {
+    busbar_gateway::start(site, Options { listen, ..Options::default() }).await.map_err(|error| match error {
         StartError::AddressInUse { .. } => Failure::Failed(format!("{error} (--listen ADDR:PORT)")),
         _ => Failure::failed(error),
     })

@@ -16,15 +16,6 @@ const LONG: Duration = Duration::from_secs(120);
 /// What is asked for, and what a reader does not take may wait for.
 const STEPS: u16 = 20;
 
-/// Room for both ends of a thousand connections.
-fn raise_the_number_of_open_files() {
-    use rustix::process::{Resource, getrlimit, setrlimit};
-    let mut limit = getrlimit(Resource::Nofile);
-    limit.current = limit.maximum;
-    setrlimit(Resource::Nofile, limit).unwrap();
-    assert!(limit.maximum.is_none_or(|most| most > 2_500), "a thousand readers need more files: {limit:?}");
-}
-
 /// MiB that this process holds: for people, not judged.
 fn resident_mib() -> usize {
     let pages = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
@@ -62,7 +53,6 @@ fn number(event: &Event) -> Option<u64> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_thousand_readers_of_which_a_hundred_never_read() {
-    raise_the_number_of_open_files();
     let device = Imitation::start().await;
     let slowly = site(&format!("tcp://{}", device.address()))
         .replace("fast = \"50ms\", slow = \"200ms\"", "fast = \"250ms\", slow = \"2s\"");
@@ -205,10 +195,10 @@ async fn an_id_that_is_none_of_ours_begins_anew() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_filter_may_be_long_but_not_wrong() {
     let bench = ready().await;
-    let many = vec!["gen1"; 5_000].join(",");
+    let many = vec!["gen1"; 1_000].join(",");
     let mut stream = bench.client.events(&format!("?device={many}")).await;
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
-    let signals = format!("?signal=genset.l1.voltage,{}", vec!["x"; 12_000].join(","));
+    let signals = format!("?signal=genset.l1.voltage,{}", vec!["x"; 2_000].join(","));
     let mut stream = bench.client.events(&signals).await;
     stream.next().await.unwrap();
     assert_eq!(stream.next().await.unwrap().data["values"].as_array().unwrap().len(), 1);
