@@ -12,6 +12,7 @@ mod identity;
 mod live;
 mod openapi;
 mod readers;
+mod reload;
 mod sharing;
 mod start;
 mod support;
