@@ -129,10 +129,7 @@ async fn a_snapshot_first_then_each_state_then_what_changes() {
     let (values, joined) = {
         let slot = &hub.table().devices[0];
         let live = slot.lock();
-        let points = 0..live.device.site().profile.points.len();
-        let values: Vec<_> =
-            points.filter(|index| live.device.shows(*index)).map(|index| live.device.value(index)).collect();
-        (values, live.device.joined_views())
+        (live.device.values(), live.device.joined_views())
     };
     assert_eq!(states[0].data["values"], json!(values));
     assert_eq!(states[0].data["joined"], json!(joined));
