@@ -133,7 +133,15 @@ test('address and number come on request, by a button', async () => {
   flushSync()
   expect(button.getAttribute('aria-expanded')).toBe('true')
   const details = text(document.getElementById(button.getAttribute('aria-controls')!))
-  for (const fact of ['10246 · 410247 · 2 registers', 'volts (u16)', '08FE 0000', 'page 11', 'sign']) {
+  for (const fact of [
+    '10246 · 410247 · 0x2806 · 2 registers',
+    'Point volts',
+    'u16: unsigned, 16 bits',
+    'Read 04:00:00, each round',
+    '08FE 0000',
+    'page 11',
+    'does not say for certain whether it can be negative',
+  ]) {
     expect(details).toContain(fact)
   }
 })
