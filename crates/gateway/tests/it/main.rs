@@ -8,6 +8,7 @@ mod events;
 mod faults;
 mod hostile;
 mod http;
+mod identity;
 mod live;
 mod openapi;
 mod sharing;
