@@ -11,6 +11,7 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
+use crate::events;
 use crate::hub::Hub;
 use crate::running::{Running, Unopened};
 use crate::server::{self, Limits};
@@ -89,6 +90,7 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     let mut tasks = JoinSet::new();
     running.poll(Running::default(), &hub, &mut tasks);
     tasks.spawn(age(Arc::clone(&hub)));
+    tasks.spawn(events::beat(Arc::clone(&hub)));
     let service = server::Service { listener, address, limits: options.limits };
     tasks.spawn(server::serve(service, Arc::clone(&hub)));
     tracing::info!(%address, devices = site.devices.len(), "gateway started");
