@@ -17,6 +17,7 @@ use crate::running::{Running, Unopened};
 use crate::server::{self, Limits};
 use crate::site::Site;
 use crate::stop::{self, Announcer};
+use crate::table::Tally;
 
 /// How often values are looked at for their age.
 const AGEING: Duration = Duration::from_secs(1);
@@ -101,6 +102,17 @@ impl Gateway {
     /// Where it listens; with the port that the system chose when port 0 was asked for.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// How the devices fare.
+    pub fn tally(&self) -> Tally {
+        self.hub.table().tally()
+    }
+
+    /// When the age of every value was last looked at, in milliseconds since the start: each second, and it stands
+    /// still when that, or any device, hangs.
+    pub fn heartbeat(&self) -> u64 {
+        self.hub.health().last_beat()
     }
 
     /// Goes on with another site file. A wire that it did not change stays open, a device that it did not change keeps

@@ -16,7 +16,7 @@ use crate::api::types::{
     Time, ValueView, WireDetailView, WireView,
 };
 use crate::api::{PointsQuery, Problem, ValuesQuery};
-use crate::device::{Changes, Device, Round};
+use crate::device::{Changes, Device, Round, points_view};
 use crate::events::{Channel, Draft};
 use crate::health::Health;
 use crate::joined;
@@ -203,10 +203,12 @@ impl Hub {
     }
 
     pub(crate) fn points(&self, id: &str, query: &PointsQuery) -> Result<PointsView, Problem> {
-        let slot = self.device(id)?;
+        let profile = self.device(id)?.lock().device.site().profile;
+        // Made when it is asked for: kept, it would be most of the memory of a large site.
+        let points = points_view(profile);
         Ok(match &query.signal {
-            Some(signals) => slot.points.carrying(&signals.split(',').collect::<Vec<_>>()),
-            None => slot.points.clone(),
+            Some(signals) => points.carrying(&signals.split(',').collect::<Vec<_>>()),
+            None => points,
         })
     }
 
