@@ -92,7 +92,7 @@ fn two_thousand_points_are_planned_read_and_shown() {
     let hub = Hub::new(table, stop::channel().1);
     hub.finish(&slot, round(&mut plan, all, 1));
     hub.finish(&slot, round(&mut plan, Rate::Fast.into(), 0));
-    // A thousand rounds of which each changes half of everything are no matter of patience.
+    // Rounds that change half of everything.
     for number in 0..20 {
         let mut live = slot.lock();
         let changes = live.device.finish(round(&mut plan, Rate::Fast.into(), number % 2 + 1), at(1), ts(1));

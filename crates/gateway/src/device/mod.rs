@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use busbar_profile::{Decoded, Image, Quality, Rate};
 
-pub(crate) use self::identity::{Check, Expected, Finding, Known, Question};
+pub(crate) use self::identity::{Check, Finding, Known, Question};
 pub(crate) use self::round::Round;
 use self::round::{outside, windows};
 pub(crate) use self::view::points_view;
@@ -45,7 +45,6 @@ pub(crate) struct Changes {
 #[derive(Debug)]
 pub(crate) struct Device {
     site: SiteDevice,
-    expected: Expected,
     /// Id of its wire.
     wire: String,
     image: Image,
@@ -133,7 +132,6 @@ impl Device {
             identity: IdentityView { verdict: Identity::Unknown, detail: None, checked: None },
             claim: None,
             told: None,
-            expected: Expected::of(&site),
             site,
         };
         device.told = Some(device.view());
@@ -155,11 +153,6 @@ impl Device {
 
     pub(crate) fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
-    }
-
-    /// What the site file expects of it beside its profile.
-    pub(crate) fn expected(&self) -> &Expected {
-        &self.expected
     }
 
     /// Whether another device answers in its place.
@@ -393,7 +386,7 @@ impl Device {
         }
         let registers = self.image.registers(index);
         if let Some(code) = registers.and_then(|r| profile.points[index].raw_code(r, self.site.word_order)) {
-            self.claim = Some(identity::named(profile, code, self.expected.model.as_deref()));
+            self.claim = Some(identity::named(profile, code, self.site.model.as_deref()));
         }
     }
 
