@@ -7,31 +7,9 @@ use busbar_profile::plan::Read;
 use busbar_profile::signature::{Signature, signature};
 use busbar_profile::{Profile, WordOrder, builtins};
 
-use crate::api::types::{Identity, NameplateView};
+use crate::api::types::Identity;
 use crate::failure::Failure;
-use crate::site::{Nameplate, SiteDevice};
-
-/// What the site file expects of a device beside its profile.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Expected {
-    /// The model that it has to be.
-    pub(crate) model: Option<String>,
-    /// The mode that it should be in.
-    pub(crate) desired_mode: Option<String>,
-    /// What stands on the machine.
-    pub(crate) nameplate: NameplateView,
-}
-
-impl Expected {
-    pub(crate) fn of(site: &SiteDevice) -> Self {
-        let Nameplate { power_kw, tank_l, battery_v } = site.nameplate;
-        Self {
-            model: site.model.clone(),
-            desired_mode: site.desired_mode.clone(),
-            nameplate: NameplateView { power_kw, tank_l, battery_v },
-        }
-    }
-}
+use crate::site::SiteDevice;
 
 /// Who answers.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -98,7 +76,7 @@ enum Asking {
 
 impl Check {
     /// `before` is the other device that was found in its place, so that the other profiles are not asked for again.
-    pub(crate) fn new(site: &SiteDevice, expected: &Expected, before: Option<Known>) -> Self {
+    pub(crate) fn new(site: &SiteDevice, before: Option<Known>) -> Self {
         let signature = signature(site.profile, builtins());
         let nothing = || Known {
             verdict: Identity::Plausible,
@@ -108,7 +86,7 @@ impl Check {
         Self {
             profile: site.profile,
             word_order: site.word_order,
-            wanted: expected.model.clone(),
+            wanted: site.model.clone(),
             waiting: signature.first.iter().copied().collect(),
             asking: Asking::First,
             doubt: None,
@@ -307,8 +285,8 @@ mod tests {
         SiteDevice { profile: builtin(key).unwrap(), ..site_device("gen1") }
     }
 
-    fn wanting(model: &str) -> Expected {
-        Expected { model: Some(model.to_owned()), ..Expected::default() }
+    fn datakom(model: Option<&str>) -> Check {
+        Check::new(&SiteDevice { model: model.map(str::to_owned), ..site("datakom-d") }, None)
     }
 
     /// Plays a check: what comes of it, and the addresses that were asked.
@@ -337,50 +315,49 @@ mod tests {
         known
     }
 
-    fn datakom(expected: &Expected) -> Check {
-        Check::new(&site("datakom-d"), expected, None)
-    }
-
     #[test]
     fn who_names_the_wanted_model_is_confirmed_after_one_read() {
-        for expected in [Expected::default(), wanting("D-500")] {
-            let (finding, asked) = play(datakom(&expected), of("datakom-d", 0xD500));
+        for wanted in [None, Some("D-500")] {
+            let (finding, asked) = play(datakom(wanted), of("datakom-d", 0xD500));
             let Known { verdict, detail, model } = known(&finding);
             assert_eq!((*verdict, *model, asked.len()), (Identity::Confirmed, Some("D-500"), 1));
             assert_eq!(detail, "it says that it is a D-500");
         }
-        let (finding, _) = play(datakom(&wanting("D-700")), of("datakom-d", 0xD500));
+        let (finding, _) = play(datakom(Some("D-700")), of("datakom-d", 0xD500));
         assert_eq!(known(&finding).verdict, Identity::Wrong);
         assert_eq!(known(&finding).detail, "it says that it is a D-500, and the site file wants a D-700");
         for code in [0, 0xFFFF, 0xD999] {
-            let (finding, _) = play(datakom(&wanting("D-700")), of("datakom-d", code));
+            let (finding, _) = play(datakom(Some("D-700")), of("datakom-d", code));
             assert_eq!(known(&finding).verdict, Identity::Plausible, "{code:04X}h");
         }
     }
 
     #[test]
     fn another_family_is_named_where_it_is_the_only_one_that_fits() {
-        let (finding, asked) = play(datakom(&Expected::default()), of("smartgen-hat821si", 1));
+        let (finding, asked) = play(datakom(None), of("smartgen-hat821si", 1));
         let found = known(&finding);
         assert_eq!((found.verdict, asked.len()), (Identity::Wrong, 5), "{found:?}");
         assert!(found.detail.ends_with("it answers as a SmartGen HAT821SI does (profile smartgen-hat821si)"));
         // Whoever refuses all that is asked is none of them.
-        let (finding, _) = play(datakom(&Expected::default()), |_| Err(refusal(1)));
+        let (finding, _) = play(datakom(None), |_| Err(refusal(1)));
         assert_eq!(known(&finding).verdict, Identity::Wrong);
         assert!(!known(&finding).detail.contains("profile"), "{finding:?}");
         // Asked again, the others are not.
-        let again = Check::new(&site("datakom-d"), &Expected::default(), Some(known(&finding).clone()));
+        let again = Check::new(&site("datakom-d"), Some(known(&finding).clone()));
         let (same, asked) = play(again, |_| Err(refusal(1)));
         assert_eq!((same, asked.len()), (finding, 2));
     }
 
     #[test]
     fn only_a_plain_refusal_of_both_says_that_it_is_another() {
-        let first = Check::new(&site("datakom-d"), &Expected::default(), None).next().unwrap().read.address;
+        let first = datakom(None).next().unwrap().read.address;
         let second = |answer: Result<Vec<u16>, Failure>, other: Result<Vec<u16>, Failure>| {
-            play(datakom(&Expected::default()), move |read| {
-                if read.address == first { answer.clone() } else { other.clone() }
-            })
+            play(
+                datakom(None),
+                move |read| {
+                    if read.address == first { answer.clone() } else { other.clone() }
+                },
+            )
             .0
         };
         let good = || Ok(vec![7]);
@@ -395,8 +372,7 @@ mod tests {
         assert_eq!(second(Err(timeout()), Err(refusal(2))), Finding::Unclear(refusal(2)));
         assert_eq!(second(Err(timeout()), Err(timeout())), Finding::Silent(timeout()));
         // Over a wire that is down nothing else is asked.
-        let (finding, asked) =
-            play(datakom(&Expected::default()), |_| Err(outage(busbar_link::Cause::Refused)));
+        let (finding, asked) = play(datakom(None), |_| Err(outage(busbar_link::Cause::Refused)));
         assert!(matches!(finding, Finding::Silent(_)) && asked.len() == 1, "{finding:?}");
     }
 }

@@ -3,61 +3,30 @@
 //! No wire and no clock in here: finished poll rounds and the time come in, what has changed comes out.
 
 mod identity;
+mod round;
 mod view;
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use busbar_profile::plan::Read;
 use busbar_profile::{Decoded, Image, Quality, Rate};
 
-pub(crate) use self::identity::{Check, Expected, Finding, Known, Question};
+pub(crate) use self::identity::{Check, Finding, Known, Question};
+pub(crate) use self::round::Round;
+use self::round::{outside, windows};
 pub(crate) use self::view::points_view;
 use crate::alarms::{self, Alarms};
 use crate::api::types::{DeviceView, Identity, IdentityView, Time};
 use crate::failure::Failure;
 use crate::joined::Joined;
 use crate::poll_plan::polled;
-use crate::rates::{RATES, Rates};
+use crate::rates::RATES;
 use crate::site::SiteDevice;
 
 /// A value is stale after so many missed rounds...
 const STALE_ROUNDS: u32 = 3;
 /// ... but never before this.
 const STALE_AT_LEAST: Duration = Duration::from_secs(5);
-
-/// What one poll round brought.
-#[derive(Debug, Default)]
-pub(crate) struct Round {
-    /// Who answered, where that was asked before all else.
-    pub(crate) identity: Option<Known>,
-    /// What was due.
-    pub(crate) rates: Rates,
-    /// Registers that came, by address.
-    pub(crate) answers: Vec<(u16, Vec<u16>)>,
-    /// Reads that failed, and why.
-    pub(crate) failures: Vec<(Read, Failure)>,
-    /// Set when the device, not just a read, could not be reached.
-    pub(crate) silence: Option<Failure>,
-    /// Whether it was cut short, so that it says nothing about what is missing.
-    pub(crate) is_cut: bool,
-    /// How long it took, of what is read on demand: one picture may take as long as many rounds.
-    pub(crate) took: Duration,
-}
-
-impl Round {
-    /// When the wire lets a poll through again, where it held the last one back.
-    pub(crate) fn held(&self) -> Option<Duration> {
-        self.failures.last().and_then(|(_, failure)| failure.next_probe())
-    }
-
-    /// Whether the device answered anything at all, if only to refuse.
-    pub(crate) fn reached_the_device(&self) -> bool {
-        self.identity.is_some()
-            || !self.answers.is_empty()
-            || self.failures.iter().any(|(_, failure)| failure.device_answered())
-    }
-}
 
 /// What a round changed.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -76,7 +45,6 @@ pub(crate) struct Changes {
 #[derive(Debug)]
 pub(crate) struct Device {
     site: SiteDevice,
-    expected: Expected,
     /// Id of its wire.
     wire: String,
     image: Image,
@@ -164,7 +132,6 @@ impl Device {
             identity: IdentityView { verdict: Identity::Unknown, detail: None, checked: None },
             claim: None,
             told: None,
-            expected: Expected::of(&site),
             site,
         };
         device.told = Some(device.view());
@@ -186,11 +153,6 @@ impl Device {
 
     pub(crate) fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
-    }
-
-    /// What the site file expects of it beside its profile.
-    pub(crate) fn expected(&self) -> &Expected {
-        &self.expected
     }
 
     /// Whether another device answers in its place.
@@ -424,7 +386,7 @@ impl Device {
         }
         let registers = self.image.registers(index);
         if let Some(code) = registers.and_then(|r| profile.points[index].raw_code(r, self.site.word_order)) {
-            self.claim = Some(identity::named(profile, code, self.expected.model.as_deref()));
+            self.claim = Some(identity::named(profile, code, self.site.model.as_deref()));
         }
     }
 
@@ -517,40 +479,7 @@ fn comes_in_parts(profile: &busbar_profile::Profile, index: usize) -> bool {
     point.access.is_readable() && point.registers > profile.wire.max_read
 }
 
-/// What of an answer lies outside all of `spans`, which ascend.
-fn outside<'a>(
-    spans: &'a [(u32, u32)],
-    address: u16,
-    registers: &'a [u16],
-) -> impl Iterator<Item = (u16, &'a [u16])> {
-    let end = u32::from(address) + registers.len() as u32;
-    let starts = std::iter::once(u32::from(address)).chain(spans.iter().map(|span| span.1));
-    let ends = spans.iter().map(|span| span.0).chain([end]);
-    starts.zip(ends).filter_map(move |(from, to)| {
-        let (from, to) = (from.max(u32::from(address)), to.min(end));
-        let first = u16::try_from(from).ok()?;
-        let part = registers
-            .get((from - u32::from(address)) as usize..to.checked_sub(u32::from(address))? as usize)?;
-        (!part.is_empty()).then_some((first, part))
-    })
-}
-
-/// Address ranges that the answers cover, first and behind the last; answers that touch are one.
-fn windows(answers: &[(u16, Vec<u16>)]) -> Vec<(u32, u32)> {
-    let mut ranges: Vec<(u32, u32)> = answers
-        .iter()
-        .map(|(address, registers)| (u32::from(*address), u32::from(*address) + registers.len() as u32))
-        .collect();
-    ranges.sort_unstable();
-    let mut windows: Vec<(u32, u32)> = Vec::with_capacity(ranges.len());
-    for (first, end) in ranges {
-        match windows.last_mut() {
-            Some(last) if first <= last.1 => last.1 = last.1.max(end),
-            _ => windows.push((first, end)),
-        }
-    }
-    windows
-}
-
+#[cfg(test)]
+mod large;
 #[cfg(test)]
 mod tests;

@@ -450,7 +450,7 @@ fn of_another_device_nothing_is_taken_and_nothing_kept() {
 #[test]
 fn a_device_may_say_in_any_round_that_it_is_another_model() {
     let mut device = device();
-    device.expected.model = Some("T-1".to_owned());
+    device.site.model = Some("T-1".to_owned());
     device.finish(answered(Rate::Once, &[(130, &[1])]), at(0), ts(0));
     assert_eq!(device.view().identity.verdict, Identity::Confirmed);
     let changes = device.finish(answered(Rate::Once, &[(130, &[2])]), at(1), ts(1));
@@ -462,7 +462,7 @@ fn a_device_may_say_in_any_round_that_it_is_another_model() {
 fn desired_and_actual_are_told_apart() {
     let mut device = device();
     assert_eq!(device.view().desired, None, "the site file asks for nothing");
-    device.expected.desired_mode = Some("manual".to_owned());
+    device.site.desired_mode = Some("manual".to_owned());
     let met = |device: &Device| device.view().desired.unwrap().met;
     assert_eq!(met(&device), None, "not read yet");
     device.finish(answered(Rate::Fast, &[(100, &FAST)]), at(0), ts(0));

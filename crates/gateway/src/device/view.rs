@@ -5,10 +5,10 @@ use busbar_profile::{Profile, Quality, Rate, reading};
 use super::Device;
 use crate::api::types::{
     AlarmView, BitView, ChoiceView, DesiredView, DeviceView, GroupView, JoinedPointView, JoinedView,
-    ModeView, PointView, PointsView, StateView, ValueView,
+    ModeView, NameplateView, PointView, PointsView, StateView, ValueView,
 };
 use crate::joined;
-use crate::site::SiteDevice;
+use crate::site::{Nameplate, SiteDevice};
 
 impl Device {
     pub(crate) fn view(&self) -> DeviceView {
@@ -32,14 +32,14 @@ impl Device {
             last_seen: self.last_seen,
             identity: self.identity.clone(),
             desired: self.desired(mode.as_ref()),
-            nameplate: self.expected.nameplate,
+            nameplate: nameplate(self.site.nameplate),
             mode,
         }
     }
 
     /// What the site file wants beside what is.
     fn desired(&self, mode: Option<&ModeView>) -> Option<DesiredView> {
-        let wanted = self.expected.desired_mode.clone()?;
+        let wanted = self.site.desired_mode.clone()?;
         let met = mode.and_then(|mode| mode.canonical.as_ref()).map(|canonical| *canonical == wanted);
         Some(DesiredView { mode: wanted, met })
     }
@@ -134,6 +134,10 @@ impl Device {
             raw: raw.map(<[u16]>::to_vec),
         }
     }
+}
+
+fn nameplate(Nameplate { power_kw, tank_l, battery_v }: Nameplate) -> NameplateView {
+    NameplateView { power_kw, tank_l, battery_v }
 }
 
 /// What there is to read of a device of this profile.

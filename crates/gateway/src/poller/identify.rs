@@ -57,10 +57,7 @@ impl Poller {
 
     /// What its answers come to; and when the wire lets the next question through, where it held one back.
     async fn ask(&self) -> (Option<Finding>, Option<Duration>) {
-        let mut check = {
-            let live = self.slot.lock();
-            Check::new(&self.site, live.device.expected(), self.other.clone())
-        };
+        let mut check = Check::new(&self.site, self.other.clone());
         let mut held = None;
         while let Some(Question { read, of }) = check.next() {
             // Whoever it is has the pauses that it wants.

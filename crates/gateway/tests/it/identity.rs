@@ -216,3 +216,28 @@ async fn another_unit_of_the_line_that_took_its_place_without_a_word_is_found_ou
     )
     .await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_model_that_the_site_file_does_not_want_is_another_device() {
+    let device = Imitation::start().await;
+    let wanting = site(&format!("tcp://{}", device.address()))
+        .replace("unit = 1", "unit = 1\nmodel = \"D-700\"\ndesired_mode = \"manual\"\nnameplate_kw = 400");
+    let (_gateway, client) = start(&wanting).await;
+    let view = async || client.get("/api/v1/devices/gen1").await.json();
+    let wrong = until(view, |view| view["identity"]["verdict"] == "wrong").await;
+    let detail = wrong["identity"]["detail"].as_str().unwrap();
+    assert_eq!(detail, "it says that it is a D-500, and the site file wants a D-700");
+    assert_eq!(
+        (&wrong["desired"], &wrong["nameplate"]["power_kw"]),
+        (&json!({ "mode": "manual", "met": null }), &json!(400.0))
+    );
+    assert_nothing_is_believed(&values(&client).await);
+    device.change(|device| device.registers.insert(10_609, 0xD700));
+    let right = until(view, |view| view["desired"]["met"] == false).await;
+    assert_eq!(
+        (&right["identity"]["verdict"], &right["mode"]["canonical"]),
+        (&json!("confirmed"), &json!("auto"))
+    );
+    device.change(|device| device.registers.insert(10_605, 2));
+    until(view, |view| view["desired"]["met"] == true).await;
+}

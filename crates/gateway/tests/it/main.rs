@@ -10,6 +10,7 @@ mod hostile;
 mod http;
 mod identity;
 mod live;
+mod on_demand;
 mod openapi;
 mod readers;
 mod reload;
