@@ -6,6 +6,8 @@ use busbar_link::Endpoint;
 use busbar_profile::WordOrder;
 use clap::{Parser, Subcommand};
 
+use crate::logging::Format;
+
 /// Reads, commands, imitates and serves standby-power controllers over Modbus.
 #[derive(Debug, Parser)]
 #[command(name = "busbar", version, disable_help_subcommand = true, arg_required_else_help = true)]
@@ -66,6 +68,10 @@ pub(crate) struct Demo {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "SIGHUP reads the site file again; a wrong one is reported and changes nothing. Ctrl-C and SIGTERM end it in good\n\
+    order, a second one at once. docs/operation.md tells more."
+)]
 pub(crate) struct Run {
     /// The site file: wires, devices, where to listen
     #[arg(long, value_name = "FILE")]
@@ -73,6 +79,12 @@ pub(crate) struct Run {
     /// Where the page is served, in place of what the site file says; port 0 takes a free one
     #[arg(long, value_name = "ADDR:PORT", value_parser = socket_address)]
     pub(crate) listen: Option<SocketAddr>,
+    /// Log every frame of a wire, both ways; may be repeated
+    #[arg(long, value_name = "WIRE")]
+    pub(crate) trace: Vec<String>,
+    /// The log on standard error: text for people, json for programs
+    #[arg(long, value_name = "FORMAT", default_value = "text", value_parser = log_format)]
+    pub(crate) log: Format,
     /// Folder for what must outlive a restart (nothing is kept yet)
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
@@ -276,6 +288,14 @@ fn socket_address(text: &str) -> Result<SocketAddr, String> {
         None => text.to_owned(),
     };
     address.parse().map_err(|_| "write ADDRESS:PORT, for example 127.0.0.1:8080".to_owned())
+}
+
+fn log_format(text: &str) -> Result<Format, String> {
+    match text {
+        "text" => Ok(Format::Text),
+        "json" => Ok(Format::Json),
+        _ => Err("a log is written as text or json".to_owned()),
+    }
 }
 
 /// Decimal, or hex behind `0x`.

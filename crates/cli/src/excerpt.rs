@@ -26,6 +26,11 @@ impl Excerpts {
         Self { source: NamedSource::new(file, text), excerpts }
     }
 
+    /// Each mistake and its remedy in one sentence.
+    pub(crate) fn sentences(&self) -> impl Iterator<Item = String> {
+        self.excerpts.iter().map(|excerpt| format!("{}; {}", excerpt.sentence, excerpt.help))
+    }
+
     /// All mistakes, one under the other.
     pub(crate) fn render(&self, coloured: bool) -> String {
         let theme = if coloured { GraphicalTheme::unicode() } else { GraphicalTheme::none() };

@@ -27,6 +27,16 @@ impl Failure {
         Self::Failed(error.to_string())
     }
 
+    /// What went wrong, as sentences for a log.
+    pub(crate) fn sentences(&self) -> Vec<String> {
+        match self {
+            Self::Call(sentence) | Self::Failed(sentence) => vec![sentence.clone()],
+            Self::Findings(excerpts) => excerpts.sentences().collect(),
+            Self::Output(error) => vec![error.to_string()],
+            Self::Help(_) | Self::Reported => Vec::new(),
+        }
+    }
+
     /// Says on standard error what went wrong, and gives the exit status.
     pub(crate) fn report(self) -> ExitCode {
         match self {

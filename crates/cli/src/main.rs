@@ -9,6 +9,7 @@ mod excerpt;
 mod failure;
 mod harvest;
 mod logging;
+mod manager;
 mod people;
 mod profiles;
 mod runtime;

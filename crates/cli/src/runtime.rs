@@ -64,6 +64,22 @@ impl Stop {
     }
 }
 
+/// The signal to read the configuration again, where there is one.
+pub(crate) struct Reloads(signals::Hangups);
+
+impl Reloads {
+    pub(crate) fn listen() -> Result<Self, Failure> {
+        signals::Hangups::listen().map(Self).map_err(|error: io::Error| {
+            Failure::Failed(format!("SIGHUP cannot be caught: {error}; free file handles"))
+        })
+    }
+
+    /// Returns when the configuration is to be read again.
+    pub(crate) async fn wait(&mut self) {
+        self.0.wait().await;
+    }
+}
+
 #[cfg(unix)]
 mod signals {
     use std::io;
@@ -93,6 +109,21 @@ mod signals {
             }
         }
     }
+
+    pub(super) struct Hangups(Signal);
+
+    impl Hangups {
+        pub(super) fn listen() -> io::Result<Self> {
+            signal(SignalKind::hangup()).map(Self)
+        }
+
+        pub(super) async fn wait(&mut self) {
+            // It ends with the runtime only.
+            if self.0.recv().await.is_none() {
+                std::future::pending().await
+            }
+        }
+    }
 }
 
 #[cfg(windows)]
@@ -119,6 +150,19 @@ mod signals {
                 _ = self.interrupt.recv() => {}
                 _ = self.terminate.recv() => {}
             }
+        }
+    }
+
+    /// There is no such signal here.
+    pub(super) struct Hangups;
+
+    impl Hangups {
+        pub(super) fn listen() -> io::Result<Self> {
+            Ok(Self)
+        }
+
+        pub(super) async fn wait(&mut self) {
+            std::future::pending().await
         }
     }
 }

@@ -11,11 +11,13 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
+use crate::events;
 use crate::hub::Hub;
 use crate::running::{Running, Unopened};
 use crate::server::{self, Limits};
 use crate::site::Site;
 use crate::stop::{self, Announcer};
+use crate::table::Tally;
 
 /// How often values are looked at for their age.
 const AGEING: Duration = Duration::from_secs(1);
@@ -89,6 +91,7 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     let mut tasks = JoinSet::new();
     running.poll(Running::default(), &hub, &mut tasks);
     tasks.spawn(age(Arc::clone(&hub)));
+    tasks.spawn(events::beat(Arc::clone(&hub)));
     let service = server::Service { listener, address, limits: options.limits };
     tasks.spawn(server::serve(service, Arc::clone(&hub)));
     tracing::info!(%address, devices = site.devices.len(), "gateway started");
@@ -99,6 +102,17 @@ impl Gateway {
     /// Where it listens; with the port that the system chose when port 0 was asked for.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// How the devices fare.
+    pub fn tally(&self) -> Tally {
+        self.hub.table().tally()
+    }
+
+    /// When the age of every value was last looked at, in milliseconds since the start: each second, and it stands
+    /// still when that, or any device, hangs.
+    pub fn heartbeat(&self) -> u64 {
+        self.hub.health().last_beat()
     }
 
     /// Goes on with another site file. A wire that it did not change stays open, a device that it did not change keeps

@@ -23,9 +23,14 @@ impl Health {
         self.beat.store(u64::try_from(now.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
     }
 
+    /// When that was, in milliseconds since the start.
+    pub(crate) fn last_beat(&self) -> u64 {
+        self.beat.load(Ordering::Relaxed)
+    }
+
     /// For how long they have not been, when that is too long.
     pub(crate) fn hangs(&self, now: Duration) -> Option<Duration> {
-        let since = now.saturating_sub(Duration::from_millis(self.beat.load(Ordering::Relaxed)));
+        let since = now.saturating_sub(Duration::from_millis(self.last_beat()));
         (since > LATE).then_some(since)
     }
 

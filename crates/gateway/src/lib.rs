@@ -37,3 +37,4 @@ pub use crate::api::openapi;
 pub use crate::gateway::{Gateway, Options, StartError, start};
 pub use crate::server::Limits;
 pub use crate::site::{DEFAULT_LISTEN, Poll, Site, SiteDevice, SiteWire};
+pub use crate::table::Tally;

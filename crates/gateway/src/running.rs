@@ -93,8 +93,19 @@ impl Running {
         }
     }
 
+    /// Shows the frames of the wires that the site wants to be seen, and of no others any more.
+    fn trace(&self, before: &Self) {
+        for RunningWire { site, link } in &self.wires {
+            let kept = before.wires.iter().find(|running| running.site.is_same_line(site));
+            if kept.is_some_and(|running| running.site.trace) != site.trace {
+                link.trace(site.trace.then(|| wires::frames::trace(&site.id, link)));
+            }
+        }
+    }
+
     /// Goes on with the pollers of `before` and starts those that are missing; those that have no device any more end.
     pub(crate) fn poll(&mut self, mut before: Self, hub: &Arc<Hub>, tasks: &mut JoinSet<()>) {
+        self.trace(&before);
         for device in &mut self.devices {
             let polled = before.devices.iter_mut().find(|running| running.slot.key == device.slot.key);
             device.poller = polled.and_then(|running| running.poller.take());

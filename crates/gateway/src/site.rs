@@ -54,12 +54,15 @@ pub struct SiteWire {
     /// Least pause between an exchange and the next request, whichever unit they are with; none: no more than the
     /// line and its devices need.
     pub spacing: Option<Duration>,
+    /// Whether every frame on it is logged.
+    pub trace: bool,
 }
 
 impl SiteWire {
     /// Whether the two are one line, used in one way, so that it need not be opened anew.
     pub(crate) fn is_same_line(&self, other: &Self) -> bool {
-        let Self { id, endpoint, timeout, spacing } = self;
+        // Its frames can be shown and hidden while it runs.
+        let Self { id, endpoint, timeout, spacing, trace: _ } = self;
         *id == other.id
             && *endpoint == other.endpoint
             && *timeout == other.timeout
@@ -151,7 +154,7 @@ const ENDPOINT_HELP: &str =
 const KEYS: &[&str] = &["site", "server", "wires", "devices"];
 const SITE_KEYS: &[&str] = &["name"];
 const SERVER_KEYS: &[&str] = &["listen", "hosts"];
-const WIRE_KEYS: &[&str] = &["id", "endpoint", "timeout", "spacing"];
+const WIRE_KEYS: &[&str] = &["id", "endpoint", "timeout", "spacing", "trace"];
 const DEVICE_KEYS: &[&str] = &["id", "name", "profile", "wire", "unit", "word_order", "poll"];
 const POLL_KEYS: &[&str] = &["fast", "slow"];
 
@@ -208,6 +211,7 @@ fn wires(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<PlacedWire> 
             });
         let timeout = table.duration("timeout", TIMEOUT, findings).map(|timeout| timeout.value);
         let spacing = table.duration("spacing", SPACING, findings).map(|spacing| spacing.value);
+        let trace = table.boolean("trace", findings).unwrap_or(false);
         if let Some(id) = id {
             let at = endpoint.as_ref().map_or(0..0, |endpoint| endpoint.span.clone());
             let wire = endpoint.map(|endpoint| SiteWire {
@@ -215,6 +219,7 @@ fn wires(root: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<PlacedWire> 
                 endpoint: endpoint.value,
                 timeout,
                 spacing,
+                trace,
             });
             wires.push(PlacedWire { id, wire, endpoint: at });
         }

@@ -8,8 +8,8 @@ use axum::http::StatusCode;
 use busbar_link::Link;
 
 use crate::api::Problem;
-use crate::api::types::{DiagramView, PointsView};
-use crate::device::{Device, points_view};
+use crate::api::types::DiagramView;
+use crate::device::Device;
 use crate::looks::Looks;
 use crate::poll_plan::Overview;
 
@@ -30,13 +30,24 @@ pub(crate) struct Table {
     pub(crate) diagram: DiagramView,
 }
 
+/// How the devices of a gateway fare.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Tally {
+    /// All devices of the site.
+    pub devices: usize,
+    /// Those that answer, if only to refuse.
+    pub answering: usize,
+    /// Those with a fault.
+    pub faults: usize,
+}
+
 /// One device behind its lock.
 #[derive(Debug)]
 pub(crate) struct Slot {
     /// Never used twice in a process.
     pub(crate) key: u64,
     pub(crate) id: String,
-    pub(crate) points: PointsView,
     /// Who looks at what is read on demand.
     pub(crate) looks: Looks,
     live: Mutex<Live>,
@@ -57,7 +68,6 @@ impl Slot {
         Self {
             key: KEYS.fetch_add(1, Ordering::Relaxed),
             id: device.site().id.clone(),
-            points: points_view(device.site().profile),
             looks: Looks::default(),
             live: Mutex::new(Live { device, sequence: 0 }),
             plan: Mutex::default(),
@@ -80,6 +90,24 @@ impl Slot {
 }
 
 impl Table {
+    /// Whether it is the same devices and wires that make up another table.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let devices = |table: &Self| table.devices.iter().map(|slot| slot.key).collect::<Vec<_>>();
+        let wires = |table: &Self| table.wires.iter().map(|wire| wire.0.clone()).collect::<Vec<_>>();
+        devices(self) == devices(other) && wires(self) == wires(other)
+    }
+
+    /// How the devices fare.
+    pub(crate) fn tally(&self) -> Tally {
+        let mut tally = Tally { devices: self.devices.len(), ..Tally::default() };
+        for slot in &self.devices {
+            let live = slot.lock();
+            tally.answering += usize::from(live.device.is_online());
+            tally.faults += usize::from(live.device.fault().is_some());
+        }
+        tally
+    }
+
     /// A device by its id.
     pub(crate) fn device(&self, id: &str) -> Result<&Arc<Slot>, Problem> {
         self.devices.iter().find(|slot| slot.id == id).ok_or_else(|| {

@@ -1,5 +1,6 @@
 //! The wires of a site: opened, and shown as the API has them.
 
+pub(crate) mod frames;
 mod plan;
 
 use std::collections::BTreeMap;
@@ -214,7 +215,7 @@ mod tests {
 
     fn wire() -> SiteWire {
         let endpoint = "tcp://192.0.2.7:502".parse().unwrap();
-        SiteWire { id: "w1".to_owned(), endpoint, timeout: None, spacing: None }
+        SiteWire { id: "w1".to_owned(), endpoint, timeout: None, spacing: None, trace: false }
     }
 
     #[test]

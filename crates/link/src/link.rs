@@ -18,6 +18,7 @@ use crate::queue::Ticket;
 use crate::shared::Shared;
 use crate::statistics::Statistics;
 use crate::task::Task;
+use crate::trace::Trace;
 use crate::wire::Wire;
 
 /// A handle on one wire. Clones share the wire; it is closed when the last one is gone.
@@ -50,7 +51,10 @@ impl Link {
 
         let endpoint = Arc::new(endpoint);
         let wire = Wire::new(Arc::clone(&endpoint), line, &options);
-        let shared = Arc::new(Shared::new(wire, line, options.trace.is_some()));
+        let shared = Arc::new(Shared::new(wire, line));
+        if options.trace.is_some() {
+            shared.trace(options.trace.clone());
+        }
         let timeout = options.timeout;
         runtime.spawn(Task::new(Arc::clone(&shared), Arc::clone(&endpoint), line, options));
         let owner = Arc::new(Owner { shared, endpoint });
@@ -184,6 +188,12 @@ impl Link {
     /// The state of the connection, and its changes.
     pub fn state(&self) -> watch::Receiver<WireState> {
         self.owner.shared.subscribe()
+    }
+
+    /// Shows every frame of the wire to `trace` from now on, in place of who saw them before; to nobody with `None`,
+    /// which costs nothing. It is the wire's, whichever handle it is set by.
+    pub fn trace(&self, trace: Option<Trace>) {
+        self.owner.shared.trace(trace);
     }
 
     /// Where the wire ends.

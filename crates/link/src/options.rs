@@ -31,7 +31,7 @@ pub struct Options {
     pub backoff: Backoff,
     /// How long a unit that is silent is left alone between two polls, while others on the wire answer.
     pub probes: Backoff,
-    /// Sees every frame, both ways.
+    /// Sees every frame, both ways. [`Link::trace`](crate::Link::trace) changes it later.
     pub trace: Option<Trace>,
 }
 

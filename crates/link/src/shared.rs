@@ -17,7 +17,7 @@ use crate::link::WireState;
 use crate::port::Port;
 use crate::queue::{Place, Ticket};
 use crate::stream::Stream;
-use crate::trace::Seen;
+use crate::trace::{Seen, Trace};
 use crate::wire::{Phase, Step, Wire};
 
 /// More than any frame: a read that does not fill it has emptied the socket, and the runtime knows so without asking
@@ -36,7 +36,7 @@ pub(crate) struct Shared {
 }
 
 impl Shared {
-    pub(crate) fn new(wire: Wire, line: Line, traced: bool) -> Self {
+    pub(crate) fn new(wire: Wire, line: Line) -> Self {
         Self {
             state: OnceLock::new(),
             opened: Instant::now(),
@@ -47,7 +47,8 @@ impl Shared {
                 reader: None,
                 task: None,
                 alarm: None,
-                seen: traced.then(Vec::new),
+                seen: None,
+                retraced: None,
                 down_since: None,
             }),
         }
@@ -125,6 +126,16 @@ impl Shared {
         task.into_iter().for_each(Waker::wake);
     }
 
+    /// Shows every frame from now on, or none any more.
+    pub(crate) fn trace(&self, trace: Option<Trace>) {
+        let mut guarded = self.lock();
+        guarded.seen = trace.is_some().then(Vec::new);
+        guarded.retraced = Some(trace);
+        let task = guarded.task.take();
+        drop(guarded);
+        task.into_iter().for_each(Waker::wake);
+    }
+
     /// Ends everything: the last handle is gone, or the task is.
     pub(crate) fn close(&self) {
         let mut wakes = Vec::new();
@@ -159,6 +170,8 @@ pub(crate) struct Guarded {
     alarm: Option<Duration>,
     /// What went over the wire and has not been shown yet, if somebody wants to see it.
     seen: Option<Vec<Seen>>,
+    /// Who is to be shown it from now on, until the task knows; none inside where nobody is.
+    retraced: Option<Option<Trace>>,
     /// Since when the wire has been down, if it is.
     down_since: Option<SystemTime>,
 }
@@ -237,6 +250,11 @@ impl Guarded {
     /// What went over the wire since this was last asked.
     pub(crate) fn seen(&mut self) -> Vec<Seen> {
         self.seen.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Who is to be shown what goes over the wire, if that has changed since this was last asked.
+    pub(crate) fn retraced(&mut self) -> Option<Option<Trace>> {
+        self.retraced.take()
     }
 
     /// Gets a job that was just taken in on its way, or the task to do so.
@@ -423,7 +441,7 @@ mod tests {
         let same = stream.as_fd().try_clone_to_owned().unwrap();
         let endpoint: Arc<Endpoint> = Arc::new("tcp://192.0.2.1".parse().unwrap());
         let wire = Wire::new(endpoint, Line::tcp(), &Options::default());
-        let shared = Shared::new(wire, Line::tcp(), false);
+        let shared = Shared::new(wire, Line::tcp());
         let mut cx = Context::from_waker(Waker::noop());
         let mut wakes = Vec::new();
         let job = Job {

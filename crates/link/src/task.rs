@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::task::{Context, Poll, Waker, ready};
 use std::time::Duration;
 
+use busbar_modbus::Framing;
 use tracing::{debug, info, warn};
 
 use crate::clock::{Alarm, Precision};
@@ -26,6 +27,7 @@ pub(crate) struct Task {
     connect_timeout: Duration,
     attempt: Option<Attempt>,
     alarm: Alarm,
+    framing: Framing,
     tracer: Option<Box<Tracer>>,
     told: Told,
 }
@@ -61,7 +63,8 @@ impl Task {
             endpoint,
             connect_timeout: options.connect_timeout,
             attempt: None,
-            tracer: options.trace.map(|trace| Box::new(Tracer::new(trace, line.framing))),
+            framing: line.framing,
+            tracer: None,
             told: Told::default(),
         }
     }
@@ -103,7 +106,7 @@ impl Future for Task {
             let step = guarded.turn(cx, || task.shared.now(), connected, &mut wakes);
             let now = task.shared.now();
             let news = guarded.news();
-            let seen = guarded.seen();
+            let (seen, retraced) = (guarded.seen(), guarded.retraced());
             let busy = guarded.wire.is_busy();
             guarded.sleeps(cx.waker(), task.alarm.next(now, step.until()));
             drop(guarded);
@@ -111,6 +114,9 @@ impl Future for Task {
             wakes.into_iter().for_each(Waker::wake);
             if let Some(state) = news {
                 task.publish(state);
+            }
+            if let Some(trace) = retraced {
+                task.tracer = trace.map(|trace| Box::new(Tracer::new(trace, task.framing)));
             }
             if let Some(tracer) = &mut task.tracer {
                 seen.into_iter().for_each(|seen| tracer.show(now, seen));

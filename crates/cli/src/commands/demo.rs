@@ -80,7 +80,7 @@ struct Controller<'a> {
 }
 
 pub(crate) fn run(args: &args::Demo, json: bool) -> Result<(), Failure> {
-    logging::start("warn")?;
+    logging::start("warn", logging::Format::Text)?;
     run::data(args.data.as_deref());
     runtime::service(async |mut stop| {
         let genset = over_tcp().await.map_err(emulate::failure)?;

@@ -15,7 +15,7 @@ struct Bound<'a> {
 }
 
 pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
-    logging::start("warn")?;
+    logging::start("warn", logging::Format::Text)?;
     let profile = profiles::resolve(&args.key)?;
     let usual = Config::default();
     let config = Config {

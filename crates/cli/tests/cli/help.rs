@@ -109,6 +109,7 @@ fn wrong_calls_are_one_sentence_and_status_2() {
         ("emulate datakom-d --listen tcp://127.0.0.1:0 --set fuel_level=full", "fuel_level"),
         ("demo --listen 8080", "write ADDRESS:PORT"),
         ("run", "--config <FILE> is missing"),
+        ("run --config site.toml --log xml", "a log is written as text or json"),
     ] {
         busbar(arguments).refuses().says_in_one_sentence(part);
     }

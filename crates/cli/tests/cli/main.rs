@@ -14,6 +14,8 @@ mod profile;
 #[cfg(unix)]
 mod pty;
 #[cfg(target_os = "linux")]
+mod run;
+#[cfg(target_os = "linux")]
 mod serial;
 mod services;
 mod support;

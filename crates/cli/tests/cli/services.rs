@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use crate::support::{Service, busbar, call, command, d500, without_folder, write};
 
 /// One HTTP request, answered in full.
-fn get(page: &str, path: &str) -> String {
+pub(crate) fn get(page: &str, path: &str) -> String {
     let address = page.trim_start_matches("http://").trim_end_matches('/');
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
@@ -23,7 +23,7 @@ fn get(page: &str, path: &str) -> String {
 }
 
 /// The JSON body of an answer, however it was cut into chunks.
-fn body(answer: &str) -> Value {
+pub(crate) fn body(answer: &str) -> Value {
     let (start, end) = (answer.find(['{', '[']).unwrap(), answer.rfind(['}', ']']).unwrap());
     serde_json::from_str(&answer[start..=end]).unwrap_or_else(|error| panic!("{error}: {answer}"))
 }
@@ -34,7 +34,7 @@ fn free_port() -> (TcpListener, u16) {
     (listener, port)
 }
 
-fn site(url: &str) -> String {
+pub(crate) fn site(url: &str) -> String {
     format!(
         "[site]\nname = \"Test site\"\n\n[[wires]]\nid = \"w1\"\nendpoint = \"{url}\"\n\n\
          [[devices]]\nid = \"gen1\"\nprofile = \"datakom-d\"\nwire = \"w1\"\nunit = 1\n"

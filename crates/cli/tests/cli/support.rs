@@ -117,8 +117,13 @@ pub(crate) struct Service {
 impl Service {
     #[track_caller]
     pub(crate) fn start<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Self {
-        let mut child =
-            command().args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        Self::spawn(command().args(arguments).stderr(Stdio::piped()))
+    }
+
+    /// Starts what is set up already.
+    #[track_caller]
+    pub(crate) fn spawn(command: &mut Command) -> Self {
+        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let out = BufReader::new(child.stdout.take().unwrap());
         Self { child, out }
     }
@@ -155,13 +160,18 @@ impl Service {
     /// The same, with the rest of standard output.
     #[track_caller]
     pub(crate) fn end(mut self, name: &str) -> (Option<i32>, String, String) {
-        let sent =
-            Command::new("kill").args([&format!("-{name}"), &self.child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
+        self.send(name);
         let status = self.child.wait().unwrap();
         let mut out = String::new();
         self.out.read_to_string(&mut out).unwrap();
         (status.code(), out, self.rest_of_err())
+    }
+
+    /// Sends a signal.
+    #[track_caller]
+    pub(crate) fn send(&self, name: &str) {
+        let id = self.child.id().to_string();
+        assert!(Command::new("kill").args([&format!("-{name}"), &id]).status().unwrap().success());
     }
 
     fn rest_of_err(&mut self) -> String {

@@ -134,14 +134,18 @@ async fn connection(
 
 /// Everything that is served.
 fn router(hub: Arc<Hub>, known: Known, limits: &Limits) -> Router {
+    let waiting = guard::waiting(limits);
+    let document = page::document(Arc::clone(&hub))
+        .layer(from_fn_with_state(Arc::clone(&waiting), guard::weighed))
+        .layer(CompressionLayer::new());
     let api = api::router(hub)
         .layer(from_fn(api::tagged))
-        .layer(from_fn_with_state(guard::waiting(limits), guard::weighed))
+        .layer(from_fn_with_state(waiting, guard::weighed))
         .layer(CompressionLayer::new())
         .layer(from_fn_with_state(guard::streams(limits), guard::counted))
         .layer(header_unless_set(header::CACHE_CONTROL, "no-store"))
         .layer(header_unless_set(header::VARY, "accept-encoding"));
-    guard::guarded(Router::new().merge(api).merge(page::router()), known)
+    guard::guarded(Router::new().merge(api).merge(document).merge(page::files()), known)
 }
 
 #[cfg(test)]

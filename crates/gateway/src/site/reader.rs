@@ -100,6 +100,11 @@ impl<'t, 'i> Table<'t, 'i> {
         }
     }
 
+    pub(super) fn boolean(&self, key: &str, findings: &mut Collector<'_>) -> Option<bool> {
+        let value = self.value(key)?;
+        value.get_ref().as_bool().or_else(|| wrong_type(key, value, "true or false without quotes", findings))
+    }
+
     /// A duration within `limits`.
     pub(super) fn duration(
         &self,

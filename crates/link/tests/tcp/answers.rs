@@ -1,6 +1,7 @@
 //! What goes over the wire, and what is taken for an answer.
 
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use busbar_link::{Direction, Link, LinkError, Options, Trace, WireState, Write};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -215,6 +216,35 @@ async fn shows_every_frame_both_ways() {
             (Direction::Received, vec![0, 1, 0, 0, 0, 5, 1, 3, 2, 0, 222]),
         ]
     );
+}
+
+#[tokio::test]
+async fn frames_are_shown_only_while_somebody_wants_to_see_them() {
+    let (listener, endpoint) = listener().await;
+    let peer = async move {
+        let (mut stream, _) = listener.accept().await.unwrap();
+        for value in [111, 222, 333, 444] {
+            let asked = request(&mut stream).await;
+            stream.write_all(&register(&asked, value)).await.unwrap();
+        }
+        hung_up(stream).await;
+    };
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let client = async {
+        let link = Link::open(endpoint, patient()).unwrap();
+        assert_eq!(read(&link).await, Ok(vec![111]));
+        for (trace, value) in [(Some("one"), 222), (None, 333), (Some("two"), 444)] {
+            let sink = Arc::clone(&seen);
+            // Any handle will do: the wire is one.
+            link.with_timeout(Duration::from_secs(9)).trace(trace.map(|name| {
+                Trace::new(move |event| sink.lock().unwrap().push((name, event.direction, event.bytes.len())))
+            }));
+            assert_eq!(read(&link).await, Ok(vec![value]));
+        }
+    };
+    play(peer, client).await;
+    let both = |name| [(name, Direction::Sent, 12), (name, Direction::Received, 11)];
+    assert_eq!(*seen.lock().unwrap(), [both("one"), both("two")].concat());
 }
 
 #[tokio::test]
