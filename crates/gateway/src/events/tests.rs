@@ -376,7 +376,7 @@ async fn only_what_is_asked_for_is_told() {
         other_round(&hub);
         for told in &mut readers {
             for (rate, wanted) in
-                [("fast", fast), ("slow", slow)].into_iter().filter(|(_, wanted)| *wanted != "")
+                [("fast", fast), ("slow", slow)].into_iter().filter(|(_, wanted)| !wanted.is_empty())
             {
                 let event = told.next().await;
                 assert_eq!((event.name.as_str(), &event.data["rate"]), ("values", &json!(rate)), "{query}");
