@@ -33,7 +33,9 @@ export class Imitated {
       const path = new URL(request.url ?? '/', 'http://site').pathname
       if (path === '/api/v1/events') {
         answer.writeHead(200, { 'content-type': 'text/event-stream' })
-        answer.write(`event: snapshot\ndata: ${JSON.stringify(told)}\n\n`)
+        const { states, ...whole } = told
+        const events = [['snapshot', whole], ...states.map((state) => ['state', state])] as const
+        for (const [name, data] of events) answer.write(`event: ${name}\ndata: ${JSON.stringify(data)}\n\n`)
       } else if (path.endsWith('/points')) {
         answer.writeHead(200, { 'content-type': 'application/json' })
         answer.end(JSON.stringify(points))

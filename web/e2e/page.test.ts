@@ -43,7 +43,10 @@ async function open(hash = '', viewport = DESK, colorScheme: 'light' | 'dark' = 
       complaints.push(`console: ${message.text()}`)
   })
   page.on('pageerror', (error) => complaints.push(`error: ${error.message}`))
-  page.on('requestfailed', (request) => complaints.push(`failed: ${request.url()}`))
+  page.on('requestfailed', (request) => {
+    // A stream or request that the page itself ends, because nobody looks any more, is none that failed.
+    if (request.failure()?.errorText !== 'net::ERR_ABORTED') complaints.push(`failed: ${request.url()}`)
+  })
   page.on('response', (answer) => {
     if (answer.status() >= 400) complaints.push(`${answer.status()}: ${answer.url()}`)
   })

@@ -216,9 +216,9 @@ function site(count: number) {
       view.last_seen = stamp(-3600)
     }
     if (index % 7 === 5) {
-      const detail = 'it says that it is a D-300, the site file wants a D-500'
+      const detail = 'it says that it is a D-300, and the site file wants a D-500'
       view.identity = { verdict: 'wrong', detail, checked: stamp(0) }
-      view.fault = `${view.name} is another device: ${detail}`
+      view.fault = `${view.name} is not what the site file says: ${detail}; connect the right device`
     }
     if (index % 7 === 6) view.alarms = { ...view.alarms, shutdown: 1, warning: 2 }
     return {

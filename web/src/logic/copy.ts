@@ -15,6 +15,7 @@ function copySelected(text: string): boolean {
   field.value = text
   field.className = 'aside'
   document.body.append(field)
+  field.focus({ preventScroll: true })
   field.select()
   try {
     return document.execCommand('copy')

@@ -1,10 +1,13 @@
 // Finds points of a controller by what people know of them: a word, an id, an address, a 4xxxx number, a label.
+import { unitText } from './format'
 import type { GroupView, PointView } from './types'
 
 /** Why a point was found, where its name does not show it. */
 export interface Hit {
   what: string
   text: string
+  /** The number of the bit, where it is one: a person wants to know whether it is set. */
+  bit?: number
 }
 
 export interface Found {
@@ -39,14 +42,24 @@ export function find(groups: readonly GroupView[], query: string): Found {
 }
 
 function matchOf(point: PointView, title: string, terms: readonly string[]): Hit[] | undefined {
-  const why = new Map<string, Hit>()
+  const why = new Map<string, { hit: Hit; terms: number }>()
   for (const term of terms) {
-    const name = point.name.toLowerCase().includes(term) || title.toLowerCase().includes(term)
-    const hits = name ? [] : hitsOf(point, term)
-    if (!name && hits.length === 0) return undefined
-    for (const hit of hits) why.set(`${hit.what} ${hit.text}`, hit)
+    const named = point.name.toLowerCase().includes(term) || title.toLowerCase().includes(term)
+    const hits = hitsOf(point, term)
+    if (!named && hits.length === 0) return undefined
+    for (const hit of hits) {
+      const key = `${hit.what} ${hit.text}`
+      why.set(key, { hit, terms: (why.get(key)?.terms ?? 0) + 1 })
+    }
   }
-  return [...why.values()].slice(0, MOST_HITS)
+  const name = `${title} ${point.name}`.toLowerCase()
+  if (terms.every((term) => name.includes(term))) return []
+  // What holds most of the terms is what was meant.
+  const most = Math.max(...[...why.values()].map(({ terms }) => terms))
+  return [...why.values()]
+    .filter(({ terms }) => terms === most)
+    .map(({ hit }) => hit)
+    .slice(0, MOST_HITS)
 }
 
 function hitsOf(point: PointView, term: string): Hit[] {
@@ -58,11 +71,15 @@ function hitsOf(point: PointView, term: string): Hit[] {
   }
   if (has(point.id)) hits.push({ what: 'id', text: point.id })
   if (has(point.signal)) hits.push({ what: 'signal', text: point.signal ?? '' })
-  if (point.unit?.toLowerCase() === term) hits.push({ what: 'unit', text: point.unit })
+  if (point.unit?.toLowerCase() === term || unitText(point.unit).toLowerCase() === term)
+    hits.push({ what: 'unit', text: unitText(point.unit) })
   for (const { value, label } of point.choices)
     if (has(label)) hits.push({ what: `choice ${value}`, text: label })
-  for (const { bit, label, id, signal } of point.bits)
-    if (has(label) || has(id) || has(signal)) hits.push({ what: `bit ${bit}`, text: label })
+  for (const { bit, label, id, signal } of point.bits) {
+    const other = has(label) ? undefined : has(id) ? id : has(signal) ? signal : undefined
+    if (has(label) || other)
+      hits.push({ what: `bit ${bit}`, text: other ? `${label} (${other})` : label, bit })
+  }
   return hits
 }
 
