@@ -1,6 +1,6 @@
 // The whole page in a document of its own, fed by a stream and an answer that the test holds in its hands.
 import { flushSync, mount, unmount } from 'svelte'
-import { afterEach, beforeEach, expect, test, vi } from 'vitest'
+import { afterEach, beforeAll, beforeEach, expect, test, vi } from 'vitest'
 import App from '../App.svelte'
 import { deviceLink } from '../logic/route'
 import {
@@ -66,6 +66,9 @@ async function show(first: Whole): Promise<void> {
 
 const line = (id: string) => document.querySelector<HTMLElement>(`[data-point="${id}"]`)!
 const text = (element: Element | null) => element?.textContent?.replace(/\s+/g, ' ').trim()
+
+// Fetched while it is shown otherwise, and the clock of a test that waits goes on.
+beforeAll(() => import('./DevicePage.svelte'))
 
 beforeEach(() => {
   vi.useFakeTimers({ now: START + 2000, toFake: ['Date', 'setTimeout', 'clearTimeout'] })
