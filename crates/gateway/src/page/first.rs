@@ -7,7 +7,7 @@ use jiff::Timestamp;
 
 use super::tiles::{self, Tile};
 use crate::api::types::{AlarmView, Class, Kind, PointsView, Quality, WireState};
-use crate::device::Device;
+use crate::device::{Device, points_view};
 use crate::hub::Hub;
 
 /// Most devices whose values are in the document: on a slow line every one of them costs a part of a second.
@@ -53,7 +53,7 @@ fn cards(hub: &Hub) -> BTreeMap<String, PointsView> {
     for slot in &hub.table().devices {
         let profile = slot.lock().device.site().profile;
         cards.entry(profile.key.clone()).or_insert_with(|| {
-            let mut points = slot.points.carrying(&tiles::signals(profile.kind.into()));
+            let mut points = points_view(profile).carrying(&tiles::signals(profile.kind.into()));
             // A card shows the label that came with the value.
             for point in points.groups.iter_mut().flat_map(|group| &mut group.points) {
                 point.choices.clear();
