@@ -40,12 +40,13 @@ const FLAGS = point('flags', {
 let emit: (type: string, data?: unknown) => void
 let tell: (whole: Whole) => void
 let page: Page
+let streams: Streams
 let app: Record<string, unknown>
 let groups: GroupView[]
 let whole: JoinedPointView[]
 
 async function show(first: Whole): Promise<void> {
-  const streams = new Streams()
+  streams = new Streams()
   emit = (type, data) => {
     streams.emit(type, data)
     flushSync()
@@ -82,6 +83,14 @@ afterEach(async () => {
   await unmount(app)
   vi.unstubAllGlobals()
   vi.useRealTimers()
+})
+
+test('one stream of its own tells all of the device, however often that changes', async () => {
+  await show(snapshot([{ device: device('gen1'), values: [value('volts', 230.2)] }]))
+  emit('device', device('gen1', { name: 'Other' }))
+  emit('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(5), changed: [] })
+  const asked = streams.asked.map((address) => new URL(address).searchParams.get('device'))
+  expect(asked).toEqual([null, 'gen1'])
 })
 
 test('a good value stands as it came, with unit and age, and ages each second', async () => {
