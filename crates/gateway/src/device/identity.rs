@@ -9,7 +9,7 @@ use busbar_profile::{Profile, WordOrder, builtins};
 
 use crate::api::types::{Identity, NameplateView};
 use crate::failure::Failure;
-use crate::site::SiteDevice;
+use crate::site::{Nameplate, SiteDevice};
 
 /// What the site file expects of a device beside its profile.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -23,8 +23,13 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    pub(crate) fn of(_site: &SiteDevice) -> Self {
-        Self::default()
+    pub(crate) fn of(site: &SiteDevice) -> Self {
+        let Nameplate { power_kw, tank_l, battery_v } = site.nameplate;
+        Self {
+            model: site.model.clone(),
+            desired_mode: site.desired_mode.clone(),
+            nameplate: NameplateView { power_kw, tank_l, battery_v },
+        }
     }
 }
 

@@ -4,6 +4,7 @@ mod guard;
 mod held;
 mod limits;
 mod places;
+mod refusal;
 
 use std::net::SocketAddr;
 use std::pin::pin;
@@ -24,6 +25,7 @@ use tower_http::compression::CompressionLayer;
 use self::guard::{Known, header_unless_set};
 pub use self::limits::Limits;
 use self::places::{Activity, Places};
+use self::refusal::Worded;
 use crate::api;
 use crate::hub::Hub;
 use crate::page;
@@ -116,7 +118,7 @@ async fn connection(
         let answer = hyper::service::Service::call(&router, request);
         async move { answer.await.map(|response| held::holding(response, answering)) }
     });
-    let mut connection = pin!(server.serve_connection(TokioIo::new(stream), service));
+    let mut connection = pin!(server.serve_connection(TokioIo::new(Worded::new(stream)), service));
     let stopped = tokio::select! {
         result = connection.as_mut() => {
             if let Err(error) = result {
