@@ -71,6 +71,12 @@ export interface JoinedTile extends Head {
 
 export type Tile = PointTile | FlagTile | FeedTile | JoinedTile
 
+/** The points that a tile is made of. */
+export function pointsOf(tile: Tile): PointView[] {
+  if (tile.kind === 'feed') return tile.flags.map(({ point }) => point)
+  return tile.kind === 'joined' ? [] : [tile.point]
+}
+
 export function tilesOf(
   groups: readonly GroupView[],
   joined: readonly JoinedPointView[] = [],

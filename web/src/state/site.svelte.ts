@@ -10,6 +10,7 @@ import type {
   JoinedPointView,
   JoinedView,
   PointsView,
+  PointView,
   Rate,
   SiteInfo,
   Snapshot,
@@ -17,7 +18,7 @@ import type {
   ValuesEvent,
   ValueView,
 } from '../logic/types'
-import { cardOf, tilesOf, type Tile } from '../logic/vitals'
+import { cardOf, pointsOf, tilesOf, type Tile } from '../logic/vitals'
 import type { EventName } from './source'
 
 /** One point's value. Each has its own state, so that a change redraws one cell. */
@@ -38,12 +39,8 @@ export class Cell {
 export class Device {
   view = $state.raw() as DeviceView
   alarms = $state.raw<readonly AlarmView[]>([])
-  /** What the points are; undefined until it has been fetched. */
-  groups = $state.raw<readonly GroupView[]>()
   /** What several points make up, fetched with the points. */
   joined = $state.raw<readonly JoinedPointView[]>([])
-  /** What its card in the overview is made of, fetched alone: the rest is much more. */
-  glance = $state.raw<readonly Tile[]>()
   /** What they make up now, by signal. */
   whole = $state<Record<string, JoinedView>>({})
   /** When the last round of each rate was read. */
@@ -53,11 +50,38 @@ export class Device {
   /** A stream of its own keeps all of its values up to date. */
   followed = false
   #cells = new Map<string, Cell>()
+  #groups = $state.raw<readonly GroupView[]>()
+  #glance = $state.raw<readonly Tile[]>()
   /** The points and joined signals that the stream of all devices keeps up to date. */
   #shared = new Set<string>()
 
   constructor(view: DeviceView) {
     this.view = view
+  }
+
+  /** What the points are; undefined until it has been fetched. */
+  get groups(): readonly GroupView[] | undefined {
+    return this.#groups
+  }
+
+  set groups(groups: readonly GroupView[] | undefined) {
+    this.#foresee(groups?.flatMap(({ points }) => points))
+    this.#groups = groups
+  }
+
+  /** What its card in the overview is made of, fetched alone: the rest is much more. */
+  get glance(): readonly Tile[] | undefined {
+    return this.#glance
+  }
+
+  set glance(tiles: readonly Tile[] | undefined) {
+    this.#foresee(tiles?.flatMap(pointsOf))
+    this.#glance = tiles
+  }
+
+  /** A reaction does not follow what it makes itself: the cells are there before anything shows them. */
+  #foresee(points: readonly PointView[] = []): void {
+    for (const { id } of points) this.cell(id)
   }
 
   cell(point: string): Cell {

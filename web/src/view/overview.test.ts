@@ -61,6 +61,22 @@ afterEach(async () => {
   vi.useRealTimers()
 })
 
+test('what the document knows of a card is filled when the state comes after it was drawn', () => {
+  const points = [point('kw', { signal: 'genset.power.active', unit: 'kW' })]
+  const streams = new Streams()
+  page = new Page(streams.open, undefined, { 'datakom-d': { groups: [group('Genset', points)], joined: [] } })
+  page.start()
+  app = mount(App, { target: document.body, props: { page } })
+  const whole = snapshot([{ device: device('gen1'), values: [value('kw', 312)] }])
+  streams.emit('snapshot', whole)
+  flushSync()
+  expect(card('gen1').querySelectorAll('dd.good .number')).toHaveLength(0)
+  streams.emit('state', whole.states[0])
+  flushSync()
+  expect(text(card('gen1').querySelector('dd.good'))).toMatch(/^312 kW/)
+  expect(asked).toEqual([])
+})
+
 test('a card a controller: what it is, does, and measures, and how old that is', async () => {
   const state = { code: 5, label: 'Cooling down', canonical: 'cooldown', timer_s: 67 }
   const view = device('gen1', { state, mode: { code: 4, label: 'AUTO', canonical: 'auto' } })

@@ -1,6 +1,6 @@
 // The whole page in a document of its own, fed by a stream and an answer that the test holds in its hands.
 import { flushSync, mount, unmount } from 'svelte'
-import { afterEach, beforeEach, expect, test, vi } from 'vitest'
+import { afterEach, beforeAll, beforeEach, expect, test, vi } from 'vitest'
 import App from '../App.svelte'
 import { deviceLink } from '../logic/route'
 import {
@@ -40,12 +40,13 @@ const FLAGS = point('flags', {
 let emit: (type: string, data?: unknown) => void
 let tell: (whole: Whole) => void
 let page: Page
+let streams: Streams
 let app: Record<string, unknown>
 let groups: GroupView[]
 let whole: JoinedPointView[]
 
 async function show(first: Whole): Promise<void> {
-  const streams = new Streams()
+  streams = new Streams()
   emit = (type, data) => {
     streams.emit(type, data)
     flushSync()
@@ -67,6 +68,9 @@ async function show(first: Whole): Promise<void> {
 const line = (id: string) => document.querySelector<HTMLElement>(`[data-point="${id}"]`)!
 const text = (element: Element | null) => element?.textContent?.replace(/\s+/g, ' ').trim()
 
+// Fetched while it is shown otherwise, and the clock of a test that waits goes on.
+beforeAll(() => import('./DevicePage.svelte'))
+
 beforeEach(() => {
   vi.useFakeTimers({ now: START + 2000, toFake: ['Date', 'setTimeout', 'clearTimeout'] })
   groups = [group('Genset', [VOLTS, FLAGS])]
@@ -79,6 +83,14 @@ afterEach(async () => {
   await unmount(app)
   vi.unstubAllGlobals()
   vi.useRealTimers()
+})
+
+test('one stream of its own tells all of the device, however often that changes', async () => {
+  await show(snapshot([{ device: device('gen1'), values: [value('volts', 230.2)] }]))
+  emit('device', device('gen1', { name: 'Other' }))
+  emit('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(5), changed: [] })
+  const asked = streams.asked.map((address) => new URL(address).searchParams.get('device'))
+  expect(asked).toEqual([null, 'gen1'])
 })
 
 test('a good value stands as it came, with unit and age, and ages each second', async () => {
