@@ -5,7 +5,7 @@ use busbar_profile::{BitSet, Class, Profile, Rate};
 use crate::api::types::{AlarmCounts, AlarmView, Time};
 
 /// The active alarms of one device, the gravest first, the oldest first among equals.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Alarms {
     active: Vec<Active>,
 }

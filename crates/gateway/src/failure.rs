@@ -23,6 +23,9 @@ pub(crate) enum Failure {
     /// Nothing came back, or nothing got through.
     #[error("{0}")]
     Link(LinkError),
+    /// Another device answers in its place, whose registers mean something else.
+    #[error("another device answers in its place: {detail}")]
+    Wrong { detail: String },
 }
 
 impl Failure {
@@ -42,6 +45,11 @@ impl Failure {
         matches!(self, Self::Exception { .. } | Self::Short { .. })
     }
 
+    /// Whether the device says that it never answers such a read.
+    pub(crate) fn is_refusal(&self) -> bool {
+        matches!(self, Self::Exception { code: ..=ILLEGAL_DATA_VALUE, .. })
+    }
+
     /// Whether the device does not know one of the addresses it was asked for.
     pub(crate) fn is_illegal_address(&self) -> bool {
         matches!(self, Self::Exception { code: ILLEGAL_DATA_ADDRESS, .. })
@@ -51,8 +59,8 @@ impl Failure {
     /// not have.
     pub(crate) fn may_pass(&self) -> bool {
         match self {
-            Self::Exception { code, .. } => *code > ILLEGAL_DATA_VALUE,
-            Self::Short { .. } => false,
+            Self::Exception { .. } => !self.is_refusal(),
+            Self::Short { .. } | Self::Wrong { .. } => false,
             Self::Link(_) => true,
         }
     }

@@ -14,7 +14,7 @@ use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use crate::hub::Hub;
 use crate::running::{Running, Unopened};
-use crate::server;
+use crate::server::{self, Limits};
 use crate::site::Site;
 use crate::stop::{self, Announcer};
 use crate::table::Tally;
@@ -27,6 +27,8 @@ const AGEING: Duration = Duration::from_secs(1);
 pub struct Options {
     /// Where to listen, in place of what the site file says.
     pub listen: Option<SocketAddr>,
+    /// What clients may ask of the server; none: what suits this process.
+    pub limits: Option<Limits>,
 }
 
 /// Why a gateway did not start. Nothing of it runs then.
@@ -91,7 +93,8 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     running.poll(Running::default(), &hub, &mut tasks);
     let heartbeats = Arc::default();
     tasks.spawn(age(Arc::clone(&hub), Arc::clone(&heartbeats)));
-    tasks.spawn(server::serve(listener, address, Arc::clone(&hub)));
+    let service = server::Service { listener, address, limits: options.limits };
+    tasks.spawn(server::serve(service, Arc::clone(&hub)));
     tracing::info!(%address, devices = site.devices.len(), "gateway started");
     Ok(Gateway { address, asked: site.listen, stop, tasks, hub, running, heartbeats })
 }

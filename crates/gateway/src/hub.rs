@@ -19,6 +19,7 @@ use crate::api::types::{
 use crate::api::{PointsQuery, Problem, ValuesQuery};
 use crate::device::{Changes, Device, Round, points_view};
 use crate::events::{Event, frame};
+use crate::health::Health;
 use crate::joined;
 use crate::poll_plan::Overview;
 use crate::rates::Rates;
@@ -36,6 +37,7 @@ pub(crate) struct Hub {
     events: broadcast::Sender<Arc<Event>>,
     stop: Stop,
     origin: Instant,
+    health: Health,
 }
 
 /// What became of the site files.
@@ -57,12 +59,18 @@ impl Hub {
             events: broadcast::Sender::new(capacity),
             stop,
             origin: Instant::now(),
+            health: Health::default(),
         }
     }
 
     /// Time since the gateway started: the clock of every poller.
     pub(crate) fn now(&self) -> Duration {
         self.origin.elapsed()
+    }
+
+    /// Whether the gateway lives and is ready.
+    pub(crate) fn health(&self) -> &Health {
+        &self.health
     }
 
     /// Tells when the gateway is to end.
@@ -111,6 +119,7 @@ impl Hub {
 
     /// Marks what became too old on any device.
     pub(crate) fn expire(&self) {
+        self.health.beat(self.now());
         for slot in &self.table().devices {
             let mut live = slot.lock();
             let expired = live.device.expire(self.now());

@@ -13,9 +13,11 @@ mod device;
 mod events;
 mod failure;
 mod gateway;
+mod health;
 mod hub;
 mod joined;
 mod looks;
+mod metrics;
 mod page;
 mod patience;
 mod poll_plan;
@@ -33,5 +35,6 @@ mod wires;
 
 pub use crate::api::openapi;
 pub use crate::gateway::{Gateway, Options, StartError, start};
+pub use crate::server::Limits;
 pub use crate::site::{DEFAULT_LISTEN, Poll, Site, SiteDevice, SiteWire};
 pub use crate::table::Tally;

@@ -10,25 +10,28 @@ use tokio::time::{Sleep, sleep};
 
 /// A stream of which every write must be taken within a time.
 #[derive(Debug)]
-pub(crate) struct Patient<S> {
+pub(crate) struct Patient<S, T> {
     stream: S,
     limit: Duration,
+    /// Called whenever something was taken.
+    taken: T,
     /// Runs while a write waits.
     waiting: Option<Pin<Box<Sleep>>>,
 }
 
-impl<S: AsyncWrite + Unpin> Patient<S> {
-    pub(crate) fn new(stream: S, limit: Duration) -> Self {
-        Self { stream, limit, waiting: None }
+impl<S: AsyncWrite + Unpin, T: Fn() + Unpin> Patient<S, T> {
+    pub(crate) fn new(stream: S, limit: Duration, taken: T) -> Self {
+        Self { stream, limit, taken, waiting: None }
     }
 
-    fn write<T>(
+    fn write(
         &mut self,
         cx: &mut Context<'_>,
-        write: impl FnOnce(Pin<&mut S>, &mut Context<'_>) -> Poll<io::Result<T>>,
-    ) -> Poll<io::Result<T>> {
+        write: impl FnOnce(Pin<&mut S>, &mut Context<'_>) -> Poll<io::Result<usize>>,
+    ) -> Poll<io::Result<usize>> {
         if let Poll::Ready(result) = write(Pin::new(&mut self.stream), cx) {
             self.waiting = None;
+            (self.taken)();
             return Poll::Ready(result);
         }
         let limit = self.limit;
@@ -38,7 +41,7 @@ impl<S: AsyncWrite + Unpin> Patient<S> {
     }
 }
 
-impl<S: AsyncWrite + Unpin> AsyncWrite for Patient<S> {
+impl<S: AsyncWrite + Unpin, T: Fn() + Unpin> AsyncWrite for Patient<S, T> {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
         self.write(cx, |stream, cx| stream.poll_write(cx, bytes))
     }
@@ -64,7 +67,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Patient<S> {
     }
 }
 
-impl<S: AsyncRead + Unpin> AsyncRead for Patient<S> {
+impl<S: AsyncRead + Unpin, T: Unpin> AsyncRead for Patient<S, T> {
     fn poll_read(
         mut self: Pin<&mut Self>,
         cx: &mut Context<'_>,
@@ -86,7 +89,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn what_is_never_taken_is_given_up() {
         let (ours, _theirs) = duplex(4);
-        let mut ours = Patient::new(ours, LIMIT);
+        let mut ours = Patient::new(ours, LIMIT, || ());
         let before = Instant::now();
         let error = ours.write_all(b"12345678").await.unwrap_err();
         assert_eq!((error.kind(), before.elapsed()), (io::ErrorKind::TimedOut, LIMIT));
@@ -95,7 +98,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_slow_reader_that_takes_something_is_not() {
         let (ours, mut theirs) = duplex(4);
-        let mut ours = Patient::new(ours, LIMIT);
+        let mut ours = Patient::new(ours, LIMIT, || ());
         let reader = tokio::spawn(async move {
             let mut taken = [0; 4];
             for _ in 0..5 {

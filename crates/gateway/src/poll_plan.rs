@@ -62,8 +62,8 @@ impl PollPlan {
     /// last time one comes along, at the end, so that it delays nothing.
     pub(crate) fn reads(&mut self, rates: Rates, now: Duration) -> Vec<Read> {
         let mut reads = self.plan(rates).to_vec();
-        reads.retain(|read| !self.refused.iter().any(|(refused, at)| refused == read && now < *at + REST));
-        let planned = reads.clone();
+        reads.retain(|read| !self.rests(*read, now));
+        let planned = if self.mute.is_empty() { Vec::new() } else { reads.clone() };
         reads.retain(|read| !self.mute.iter().any(|mute| mute.read == *read));
         let first = reads.partition_point(|read| read.address < self.first);
         reads.rotate_left(first);
@@ -71,6 +71,31 @@ impl PollPlan {
         let awake = |mute: &&Mute| mute.rests_until <= now && planned.contains(&mute.read);
         reads.extend(self.mute.iter().find(awake).map(|mute| mute.read));
         reads
+    }
+
+    /// The reads of what is read on demand in a group, in address order. Of a picture the device refuses a part of,
+    /// nothing is read for a while.
+    pub(crate) fn on_demand(&self, group: usize, now: Duration) -> Vec<Read> {
+        let rests = |point: &&Point| {
+            let touches = |read: &Read| u32::from(point.address) < end(*read) && read.address <= point.last();
+            self.refused.iter().any(|(read, at)| touches(read) && now < *at + REST)
+        };
+        let points = self.points(Rate::OnDemand.into()).filter(|point| point.group == group && !rests(point));
+        self.planner.reads(points.map(|point| (point.address, point.registers)))
+    }
+
+    /// Whether the device is known to refuse this read however small it is.
+    pub(crate) fn is_refused(&self, read: Read) -> bool {
+        self.refused.iter().any(|(refused, _)| *refused == read)
+    }
+
+    fn rests(&self, read: Read, now: Duration) -> bool {
+        self.refused.iter().any(|(refused, at)| *refused == read && now < *at + REST)
+    }
+
+    /// The device answered a read with its registers.
+    pub(crate) fn accepted(&mut self, read: Read) {
+        self.refused.retain(|(refused, _)| *refused != read);
     }
 
     /// The device answered a read, if only to refuse it.
@@ -131,7 +156,7 @@ impl PollPlan {
     pub(crate) fn refused(&mut self, rates: Rates, read: Read, now: Duration) -> Vec<Read> {
         let items = self.items(rates, read.address.into(), end(read));
         let Some(middle) = middle(&items) else {
-            self.refused.retain(|(other, at)| *other != read && now < *at + REST);
+            self.refused.retain(|(other, _)| *other != read);
             self.refused.push((read, now));
             return Vec::new();
         };
@@ -234,7 +259,8 @@ mod tests {
         let once = plan.reads(Rate::Once.into(), at(0));
         assert!(once.iter().all(|read| read.count <= 16), "{once:?}");
         assert_eq!(once.iter().map(|read| read.count).sum::<u16>(), 21);
-        assert!(!plan.has(Rate::OnDemand));
+        assert_eq!(spans(&plan.on_demand(3, at(0))), [(152, 8)]);
+        assert_eq!(plan.on_demand(0, at(0)), []);
     }
 
     #[test]

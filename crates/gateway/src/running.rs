@@ -86,6 +86,7 @@ impl Running {
         Table {
             name: site.name.clone(),
             time_zone: None,
+            hosts: site.hosts.clone(),
             devices: self.devices.iter().map(|device| Arc::clone(&device.slot)).collect(),
             wires: self.wires.iter().map(|wire| (wire.site.id.clone(), wire.link.clone())).collect(),
             diagram: DiagramView::default(),

@@ -13,7 +13,13 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(10);
 /// Between two tries at least.
 const LEAST_PAUSE: Duration = Duration::from_millis(10);
 
-/// When each rate of a device is due.
+/// Another device in its place is asked who it is at least this often.
+const LONGEST_WRONG: Duration = Duration::from_secs(3);
+
+/// So long at least a device is believed to be who it said it is.
+const LEAST_TRUST: Duration = Duration::from_secs(5);
+
+/// When each rate of a device is due, and when it is asked who it is.
 #[derive(Debug)]
 pub(crate) struct Schedule {
     poll: Poll,
@@ -22,7 +28,15 @@ pub(crate) struct Schedule {
     /// None when it is done.
     once: Option<Duration>,
     /// When it was last done.
+    once_done: Option<Duration>,
+    /// When the device is asked who it is; none when that is known.
+    identity: Option<Duration>,
+    /// When it was last asked and answered.
     identified: Option<Duration>,
+    /// Whether another device answers in its place.
+    wrong: bool,
+    /// Whether the connection outlived the last round.
+    steady: bool,
     /// The next probe of a device that is silent, and how many it left unanswered.
     silent: Option<(Duration, u32)>,
 }
@@ -30,15 +44,77 @@ pub(crate) struct Schedule {
 impl Schedule {
     /// Everything is due at `now`.
     pub(crate) fn new(poll: Poll, now: Duration) -> Self {
-        Self { poll, fast: now, slow: now, once: Some(now), identified: None, silent: None }
+        Self {
+            poll,
+            fast: now,
+            slow: now,
+            once: Some(now),
+            once_done: None,
+            identity: Some(now),
+            identified: None,
+            wrong: false,
+            steady: true,
+            silent: None,
+        }
     }
 
     /// When the next round begins. What is slow waits for the next fast round, so that they share reads.
     pub(crate) fn next(&self) -> Duration {
-        match self.silent {
-            Some((at, _)) => at,
-            None => self.once.map_or(self.fast, |once| once.min(self.fast)),
+        match (self.silent, self.identity) {
+            (Some((at, _)), _) => at,
+            (None, Some(at)) if self.wrong => at,
+            (None, identity) => [self.once, identity].into_iter().flatten().fold(self.fast, Duration::min),
         }
+    }
+
+    /// Whether the device is to be asked who it is before anything else.
+    pub(crate) fn asks_identity(&self, now: Duration) -> bool {
+        self.silent.is_some() || self.is_doubted(now)
+    }
+
+    /// Whether there is reason to ask it who it is, beside its having been silent.
+    pub(crate) fn is_doubted(&self, now: Duration) -> bool {
+        self.identity.is_some_and(|at| at <= now)
+    }
+
+    /// It is the device that the site file says.
+    pub(crate) fn identified(&mut self, now: Duration) {
+        if std::mem::take(&mut self.wrong) {
+            // Nothing is known of it.
+            (self.fast, self.slow, self.once) = (now, now, Some(now));
+        }
+        (self.identity, self.identified) = (None, Some(now));
+    }
+
+    /// Another device answers in its place, and is asked again soon who it is.
+    pub(crate) fn wrong(&mut self, now: Duration) {
+        self.wrong = true;
+        self.silent = None;
+        (self.identity, self.identified) = (Some(now + self.poll.slow.min(LONGEST_WRONG)), Some(now));
+    }
+
+    /// What it answered says neither yes nor no: it is asked again with what is due next.
+    pub(crate) fn unclear(&mut self, now: Duration) {
+        if self.silent.is_some() {
+            *self = Self { identified: self.identified, ..Self::new(self.poll, now) };
+        }
+        self.fast = following(self.fast, self.poll.fast, now);
+        (self.once, self.identity) = (self.once.map(|once| once.max(self.fast)), Some(self.fast));
+    }
+
+    /// Whether so much time has gone by since the device was last asked who it is that it may be asked again.
+    pub(crate) fn may_doubt(&self, now: Duration) -> bool {
+        self.identified.is_none_or(|identified| identified + self.poll.slow.max(LEAST_TRUST) <= now)
+    }
+
+    /// There is reason to ask who it is.
+    pub(crate) fn doubt(&mut self, now: Duration) {
+        self.identity = Some(now);
+    }
+
+    /// The connection outlived a round.
+    pub(crate) fn steady(&mut self) {
+        self.steady = true;
     }
 
     /// All that a round at `now` is to read.
@@ -52,18 +128,30 @@ impl Schedule {
         self.silent.is_some()
     }
 
+    /// Whether another device answers in its place.
+    pub(crate) fn is_wrong(&self) -> bool {
+        self.wrong
+    }
+
+    /// Whether it is read in rounds.
+    pub(crate) fn is_polled(&self) -> bool {
+        self.silent.is_none() && !self.wrong
+    }
+
     /// A round is finished and the device answered. Rounds that should have begun meanwhile are left out, so that a
     /// slow wire is never owed anything.
     pub(crate) fn done(&mut self, rates: Rates, now: Duration) {
         if self.silent.take().is_some() {
-            // It was away: who knows what changed.
-            *self = Self::new(self.poll, now);
+            // It was away: who knows what changed. Who it is was asked.
+            let Self { identity, identified, .. } = *self;
+            *self = Self { identity, identified, ..Self::new(self.poll, now) };
         }
         for rate in rates.iter() {
             match rate {
                 Rate::Fast => self.fast = following(self.fast, self.poll.fast, now),
                 Rate::Slow => self.slow = following(self.slow, self.poll.slow, now),
-                Rate::Once | Rate::OnDemand => (self.once, self.identified) = (None, Some(now)),
+                Rate::Once => (self.once, self.once_done) = (None, Some(now)),
+                Rate::OnDemand => {}
             }
         }
     }
@@ -73,12 +161,16 @@ impl Schedule {
         self.once = Some(self.slow);
     }
 
-    /// What is read once is to be read again, but no more often than what is slow: there are devices that close each
-    /// connection after one answer.
-    pub(crate) fn identify(&mut self, now: Duration) {
-        let earliest = self.identified.map_or(now, |identified| identified + self.poll.slow);
-        let at = now.max(earliest);
-        self.once = Some(self.once.map_or(at, |once| once.min(at)));
+    /// The connection was made anew: there may be another device behind it. Who it is is asked at once, and what is read
+    /// once is read again; but neither more often than what is slow where a connection does not outlive a round: there
+    /// are devices that close each after one answer.
+    pub(crate) fn reconnected(&mut self, now: Duration) {
+        let slow = |done: Option<Duration>| now.max(done.map_or(now, |done| done + self.poll.slow));
+        let identity = if self.steady { now } else { slow(self.identified) };
+        self.identity = Some(self.identity.map_or(identity, |at| at.min(identity)));
+        let once = slow(self.once_done);
+        self.once = Some(self.once.map_or(once, |at| at.min(once)));
+        self.steady = false;
     }
 
     /// The device did not answer a round: the next try comes after a pause that grows.
@@ -136,6 +228,9 @@ mod tests {
             if now > end {
                 return rounds;
             }
+            if schedule.asks_identity(now) {
+                schedule.identified(now);
+            }
             let due = schedule.due(now);
             rounds.push((due, now.as_millis() as u64));
             now += takes;
@@ -181,8 +276,10 @@ mod tests {
     fn a_new_identity_is_asked_for_at_once_and_a_missed_one_again() {
         let mut schedule = Schedule::new(POLL, Duration::ZERO);
         play(&mut schedule, ms(13_000), ms(1));
-        schedule.identify(ms(13_100));
+        schedule.reconnected(ms(13_100));
         assert_eq!((schedule.next(), schedule.due(ms(13_100))), (ms(13_100), rates([Rate::Once])));
+        assert!(schedule.asks_identity(ms(13_100)));
+        schedule.identified(ms(13_100));
         schedule.done(rates([Rate::Once]), ms(13_200));
         schedule.missed_once();
         assert_eq!((schedule.next(), schedule.due(ms(14_000))), (ms(14_000), rates([Rate::Fast])));
@@ -193,15 +290,22 @@ mod tests {
     fn a_connection_that_is_made_anew_all_the_time_causes_no_storm() {
         let mut schedule = Schedule::new(POLL, Duration::ZERO);
         let (mut now, mut rounds) = (Duration::ZERO, Vec::new());
+        let mut asked = 0;
         while now <= ms(30_000) {
+            if schedule.asks_identity(now) {
+                schedule.identified(now);
+                asked += 1;
+            }
             let due = schedule.due(now);
             rounds.push((due, now.as_millis() as u64));
             now += ms(1);
             schedule.done(due, now);
-            schedule.identify(now);
+            schedule.reconnected(now);
             now = now.max(schedule.next());
         }
-        assert!(of(&rounds, Rate::Once).len() <= 4 && rounds.len() <= 34, "{rounds:?}");
+        assert!(of(&rounds, Rate::Once).len() <= 4 && rounds.len() <= 38, "{rounds:?}");
+        // At the start, when the connection first dropped, and then with what is slow.
+        assert_eq!(asked, 4);
     }
 
     #[test]
@@ -241,11 +345,61 @@ mod tests {
         let mut schedule = Schedule::new(POLL, Duration::ZERO);
         play(&mut schedule, ms(3_000), ms(1));
         schedule.silent(ms(3_100));
+        assert!(schedule.asks_identity(ms(5_000)));
+        schedule.identified(ms(5_000));
         schedule.done(rates([Rate::Fast]), ms(5_000));
         assert!(!schedule.is_silent());
         assert_eq!((schedule.next(), schedule.due(ms(5_000))), (ms(5_000), rates([Rate::Slow, Rate::Once])));
         schedule.done(rates([Rate::Slow, Rate::Once]), ms(5_020));
         assert_eq!((schedule.next(), schedule.due(ms(6_000))), (ms(6_000), rates([Rate::Fast])));
         assert_eq!(schedule.due(ms(15_000)), rates([Rate::Fast, Rate::Slow]), "and they fall together again");
+    }
+
+    #[test]
+    fn a_steady_connection_that_drops_is_doubted_at_once() {
+        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        play(&mut schedule, ms(2_500), ms(1));
+        schedule.steady();
+        schedule.reconnected(ms(2_600));
+        assert!(schedule.asks_identity(ms(2_600)) && schedule.next() == ms(2_600));
+        schedule.identified(ms(2_600));
+        assert!(!schedule.asks_identity(ms(2_600)));
+        // It did not outlive a round.
+        schedule.reconnected(ms(3_001));
+        assert!(!schedule.asks_identity(ms(12_500)) && schedule.asks_identity(ms(12_600)));
+        schedule.steady();
+        schedule.reconnected(ms(3_100));
+        assert!(schedule.asks_identity(ms(3_100)));
+    }
+
+    #[test]
+    fn another_device_is_asked_nothing_but_who_it_is() {
+        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        schedule.wrong(ms(100));
+        assert_eq!((schedule.next(), schedule.is_wrong(), schedule.is_polled()), (ms(3_100), true, false));
+        schedule.wrong(ms(3_100));
+        assert_eq!(schedule.next(), ms(6_100));
+        schedule.reconnected(ms(4_000));
+        assert_eq!(schedule.next(), ms(4_000), "whoever it is now");
+        schedule.identified(ms(4_000));
+        assert_eq!(schedule.due(ms(4_000)), rates([Rate::Fast, Rate::Slow, Rate::Once]));
+        assert!(schedule.is_polled());
+    }
+
+    #[test]
+    fn who_says_neither_yes_nor_no_is_asked_again_with_the_next_round() {
+        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        schedule.unclear(ms(20));
+        assert_eq!((schedule.next(), schedule.asks_identity(ms(999))), (ms(1_000), false));
+        assert!(schedule.asks_identity(ms(1_000)));
+        assert_eq!(schedule.due(ms(1_000)), rates([Rate::Fast, Rate::Slow, Rate::Once]));
+    }
+
+    #[test]
+    fn who_it_is_is_not_doubted_all_the_time() {
+        let mut schedule = Schedule::new(Poll { fast: ms(50), slow: ms(200) }, Duration::ZERO);
+        assert!(schedule.may_doubt(Duration::ZERO));
+        schedule.identified(ms(10));
+        assert!(!schedule.may_doubt(ms(5_009)) && schedule.may_doubt(ms(5_010)));
     }
 }

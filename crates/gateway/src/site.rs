@@ -1,6 +1,7 @@
 //! The site file: which wires and devices there are. TOML, checked as a whole before anything starts.
 
 mod checks;
+mod hosts;
 mod reader;
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -30,6 +31,8 @@ pub struct Site {
     pub name: String,
     /// Where the gateway listens.
     pub listen: SocketAddr,
+    /// Host names that a gateway for this machine alone answers to besides this machine's own: those of a proxy.
+    pub hosts: Vec<String>,
     /// The wires, in the order of the file; ids are unique.
     pub wires: Vec<SiteWire>,
     /// The devices, in the order of the file; ids are unique.
@@ -150,7 +153,7 @@ const ENDPOINT_HELP: &str =
     "write an endpoint such as \"tcp://192.0.2.20:502\" or \"rtu:///dev/ttyUSB0?baud=9600\"";
 const KEYS: &[&str] = &["site", "server", "wires", "devices"];
 const SITE_KEYS: &[&str] = &["name"];
-const SERVER_KEYS: &[&str] = &["listen"];
+const SERVER_KEYS: &[&str] = &["listen", "hosts"];
 const WIRE_KEYS: &[&str] = &["id", "endpoint", "timeout", "spacing", "trace"];
 const DEVICE_KEYS: &[&str] = &["id", "name", "profile", "wire", "unit", "word_order", "poll"];
 const POLL_KEYS: &[&str] = &["fast", "slow"];
@@ -163,10 +166,9 @@ fn read(root: &Table<'_, '_>, findings: &mut Collector<'_>, warnings: &mut Colle
     let name = site.and_then(|site| {
         site.required("name", "\"North hospital\"", findings, |site, key, findings| name(site, key, findings))
     });
-    let listen = root
-        .table("server", "[server]", SERVER_KEYS, findings)
-        .and_then(|server| listen(&server, findings))
-        .unwrap_or(DEFAULT_LISTEN);
+    let server = root.table("server", "[server]", SERVER_KEYS, findings);
+    let listen = server.as_ref().and_then(|server| listen(server, findings)).unwrap_or(DEFAULT_LISTEN);
+    let hosts = server.as_ref().map(|server| hosts::read(server, findings)).unwrap_or_default();
     let wires = wires(root, findings);
     let devices = devices(root, &wires, findings);
     checks::serial(&wires, &devices, findings);
@@ -175,6 +177,7 @@ fn read(root: &Table<'_, '_>, findings: &mut Collector<'_>, warnings: &mut Colle
     Site {
         name: name.unwrap_or_default(),
         listen,
+        hosts,
         wires: wires.into_iter().filter_map(|wire| wire.wire).collect(),
         devices: devices.into_iter().map(|placed| placed.device).collect(),
         warnings: Vec::new(),

@@ -20,6 +20,8 @@ pub(crate) struct Table {
     pub(crate) name: String,
     /// The time zone the site file gives.
     pub(crate) time_zone: Option<String>,
+    /// Names besides those of this machine that a gateway for this machine alone answers to: a proxy passes them on.
+    pub(crate) hosts: Vec<String>,
     /// In the order of the site file.
     pub(crate) devices: Vec<Arc<Slot>>,
     /// In the order of the site file: id and wire.

@@ -132,18 +132,18 @@ pub(crate) fn device() -> Device {
 /// A round in which these registers came and nothing failed.
 pub(crate) fn answered(rates: impl Into<Rates>, answers: &[(u16, &[u16])]) -> Round {
     let answers = answers.iter().map(|(address, registers)| (*address, registers.to_vec())).collect();
-    Round { rates: rates.into(), answers, failures: Vec::new(), silence: None }
+    Round { rates: rates.into(), answers, ..Round::default() }
 }
 
 /// A round in which one read failed.
 pub(crate) fn failed(rates: impl Into<Rates>, address: u16, count: u16, failure: Failure) -> Round {
     let read = Read { function: 3, address, count };
-    Round { rates: rates.into(), answers: Vec::new(), failures: vec![(read, failure)], silence: None }
+    Round { rates: rates.into(), failures: vec![(read, failure)], ..Round::default() }
 }
 
 /// A round that the device left unanswered.
 pub(crate) fn silence() -> Round {
-    Round { rates: Rate::Fast.into(), answers: Vec::new(), failures: Vec::new(), silence: Some(timeout()) }
+    Round { rates: Rate::Fast.into(), silence: Some(timeout()), ..Round::default() }
 }
 
 pub(crate) fn timeout() -> Failure {
@@ -186,6 +186,7 @@ pub(crate) fn table(devices: &[&str]) -> Table {
     Table {
         name: "Test".to_owned(),
         time_zone: None,
+        hosts: Vec::new(),
         devices: devices.iter().map(slot).collect(),
         wires: Vec::new(),
         diagram: DiagramView::default(),

@@ -166,6 +166,11 @@ impl Latency {
         (self.count() > 0).then_some(Duration::from_nanos(self.min))
     }
 
+    /// All of them together.
+    pub fn total(&self) -> Duration {
+        Duration::from_nanos(self.total)
+    }
+
     /// The mean; none before the first answer.
     pub fn mean(&self) -> Option<Duration> {
         self.total.checked_div(self.count()).map(Duration::from_nanos)

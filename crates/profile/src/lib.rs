@@ -36,6 +36,7 @@ mod profile;
 mod reading;
 mod schema;
 pub mod show;
+pub mod signature;
 mod suggest;
 mod terms;
 mod units;

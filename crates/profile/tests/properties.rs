@@ -167,3 +167,19 @@ proptest! {
         }
     }
 }
+
+/// Whoever answers one family's signature is no device of another.
+#[test]
+fn no_family_answers_the_signature_of_another() {
+    use busbar_profile::signature::{answers, signature};
+    for profile in builtins() {
+        let signature = signature(profile, builtins());
+        for reads in [&signature.first, &signature.second] {
+            assert!(reads.iter().all(|read| answers(profile, *read) && read.count <= 4), "{}", profile.key);
+            for other in builtins().iter().filter(|other| other.key != profile.key) {
+                let refused = reads.iter().any(|read| !answers(other, *read));
+                assert!(refused, "a {} answers {reads:?} of {}", other.key, profile.key);
+            }
+        }
+    }
+}

@@ -150,7 +150,7 @@ fn trace<'a>(site: &mut Site, wires: &'a [String]) -> Vec<&'a str> {
 }
 
 pub(super) async fn gateway(site: Site, listen: Option<SocketAddr>) -> Result<Gateway, Failure> {
-    busbar_gateway::start(site, Options { listen }).await.map_err(|error| match error {
+    busbar_gateway::start(site, Options { listen, ..Options::default() }).await.map_err(|error| match error {
         StartError::AddressInUse { .. } => Failure::Failed(format!("{error} (--listen ADDR:PORT)")),
         _ => Failure::failed(error),
     })

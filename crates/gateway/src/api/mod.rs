@@ -1,5 +1,8 @@
 //! The HTTP API `/api/v1` and the document that describes it.
 
+mod common;
+mod etag;
+mod operation;
 mod problem;
 pub mod types;
 
@@ -15,6 +18,7 @@ use utoipa::{IntoParams, OpenApi};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+pub(crate) use self::etag::tagged;
 pub use self::problem::Problem;
 use self::types::{
     AlarmView, AlarmsEvent, DeviceView, JoinedView, PointsView, SiteView, SnapshotEvent, ValueView,
@@ -23,12 +27,20 @@ use self::types::{
 use crate::events;
 use crate::hub::Hub;
 
+/// Where the event stream is.
+pub(crate) const EVENTS: &str = "/api/v1/events";
+
+/// What changes with a restart or another site file only may be kept, as long as its tag is asked for each time.
+const KEPT: [(header::HeaderName, &str); 1] = [(header::CACHE_CONTROL, "no-cache")];
+
 /// The OpenAPI 3.1 document of the API, as `/api/v1/openapi.json` serves it.
 pub fn openapi() -> utoipa::openapi::OpenApi {
-    routes().into_openapi()
+    let mut document = routes().into_openapi();
+    common::describe(&mut document);
+    document
 }
 
-/// Every route of the API, `/healthz` included.
+/// Every route of the API, with those for whoever keeps the gateway running.
 pub(crate) fn router(hub: Arc<Hub>) -> Router {
     Router::from(routes()).with_state(hub)
 }
@@ -46,7 +58,9 @@ fn routes() -> OpenApiRouter<Arc<Hub>> {
         .routes(routes!(wire))
         .routes(routes!(stream))
         .routes(routes!(document))
-        .routes(routes!(healthz))
+        .routes(routes!(operation::healthz))
+        .routes(routes!(operation::readyz))
+        .routes(routes!(operation::metrics))
 }
 
 #[derive(OpenApi)]
@@ -58,7 +72,7 @@ fn routes() -> OpenApiRouter<Arc<Hub>> {
     ),
     // The events are not a body that the document could describe, so their shapes are named here.
     components(schemas(SnapshotEvent, ValuesEvent, AlarmsEvent, Problem)),
-    tags((name = "site", description = "The site, its devices and its wires"), (name = "live", description = "What they read now")),
+    tags((name = "site", description = "The site, its devices and its wires"), (name = "live", description = "What they read now"), (name = "operation", description = "For whoever keeps the gateway running")),
 )]
 struct Document;
 
@@ -115,9 +129,9 @@ async fn points(
     State(hub): State<Arc<Hub>>,
     device: Result<Path<String>, PathRejection>,
     query: Result<Query<PointsQuery>, QueryRejection>,
-) -> Result<Json<PointsView>, Problem> {
+) -> Result<Response, Problem> {
     let Query(query) = query.map_err(bad_query)?;
-    hub.points(&known(device)?, &query).map(Json)
+    hub.points(&known(device)?, &query).map(|points| (KEPT, Json(points)).into_response())
 }
 
 /// Which values of a device are wanted.
@@ -243,16 +257,7 @@ async fn stream(
 )]
 async fn document() -> Response {
     static DOCUMENT: LazyLock<Vec<u8>> = LazyLock::new(|| serde_json::to_vec(&openapi()).unwrap_or_default());
-    ([(header::CONTENT_TYPE, "application/json")], DOCUMENT.as_slice()).into_response()
-}
-
-/// Whether the gateway runs.
-#[utoipa::path(
-    get, path = "/healthz", tag = "site",
-    responses((status = OK, body = String, content_type = "text/plain", description = "It runs", example = "ok")),
-)]
-async fn healthz() -> &'static str {
-    "ok\n"
+    (KEPT, [(header::CONTENT_TYPE, "application/json")], DOCUMENT.as_slice()).into_response()
 }
 
 /// The id of a device in a path.

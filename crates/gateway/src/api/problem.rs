@@ -24,6 +24,9 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// The media type of a problem.
+    pub(crate) const CONTENT_TYPE: &str = "application/problem+json";
+
     /// A problem that its status and one sentence describe.
     pub fn new(status: StatusCode, detail: impl Into<String>) -> Self {
         Self {
@@ -39,7 +42,7 @@ impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let body = serde_json::to_vec(&self).unwrap_or_default();
-        let json = HeaderValue::from_static("application/problem+json");
+        let json = HeaderValue::from_static(Self::CONTENT_TYPE);
         (status, [(header::CONTENT_TYPE, json)], body).into_response()
     }
 }

@@ -681,6 +681,11 @@ impl Time {
     pub const fn new(timestamp: jiff::Timestamp) -> Self {
         Self(timestamp)
     }
+
+    /// How long ago it was; nothing when a clock that was set back has it in the future.
+    pub(crate) fn age(self) -> std::time::Duration {
+        jiff::Timestamp::now().duration_since(self.0).try_into().unwrap_or_default()
+    }
 }
 
 impl std::fmt::Display for Time {

@@ -1,7 +1,7 @@
 use busbar_link::Cause;
 
 use super::*;
-use crate::api::types::{PointValue, Quality as Shown};
+use crate::api::types::{PointValue, Quality as Shown, ValueView};
 use crate::testing::{
     answered, at, device, failed, outage, profile, refusal, silence, site_device, timeout, ts,
 };

@@ -72,6 +72,20 @@ impl<'t, 'i> Table<'t, 'i> {
         }
     }
 
+    /// The texts of a list; what is no text in it is reported and left out.
+    pub(super) fn texts(&self, key: &str, findings: &mut Collector<'_>) -> Vec<At<String>> {
+        let Some(value) = self.value(key) else { return Vec::new() };
+        let Some(list) = value.get_ref().as_array() else {
+            wrong_type::<()>(key, value, "a list of texts in quotes, in square brackets", findings);
+            return Vec::new();
+        };
+        let text = |item: &Spanned<DeValue<'_>>| match item.get_ref().as_str() {
+            Some(text) => Some(At { value: text.to_owned(), span: item.span() }),
+            None => wrong_type(key, item, "each text in quotes", findings),
+        };
+        list.iter().filter_map(text).collect()
+    }
+
     pub(super) fn integer(&self, key: &str, findings: &mut Collector<'_>) -> Option<At<i64>> {
         let value = self.value(key)?;
         let Some(integer) = value.get_ref().as_integer() else {

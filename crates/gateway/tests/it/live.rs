@@ -47,8 +47,9 @@ async fn the_device_is_described() {
     let view = bench.until_view(|view| view["state"] != json!(null) && view["model"] == "D-500").await;
     let mut still = view.clone();
     still["last_seen"] = json!("[instant]");
+    still["identity"]["checked"] = json!("[instant]");
     insta::assert_json_snapshot!(still);
-    assert!(view["last_seen"].is_string());
+    assert!(view["last_seen"].is_string() && view["identity"]["checked"].is_string());
 }
 
 #[tokio::test(flavor = "multi_thread")]

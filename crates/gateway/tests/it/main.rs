@@ -6,7 +6,9 @@
 mod bad_line;
 mod events;
 mod faults;
+mod hostile;
 mod http;
+mod identity;
 mod live;
 mod openapi;
 mod sharing;

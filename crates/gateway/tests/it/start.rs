@@ -14,7 +14,9 @@ async fn an_address_in_use_is_said_in_one_sentence() {
     let taken = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = taken.local_addr().unwrap();
     let site = Site::parse("bench.toml", &site("tcp://127.0.0.1:1")).unwrap();
-    let error = busbar_gateway::start(site, Options { listen: Some(address) }).await.unwrap_err();
+    let error = busbar_gateway::start(site, Options { listen: Some(address), ..Options::default() })
+        .await
+        .unwrap_err();
     assert_eq!(error, StartError::AddressInUse { address });
     assert_eq!(
         error.to_string(),
@@ -27,7 +29,9 @@ async fn an_address_of_another_machine_is_said_in_one_sentence() {
     let site = Site::parse("bench.toml", &site("tcp://127.0.0.1:1")).unwrap();
     // 192.0.2.0/24 is nobody's.
     let address: SocketAddr = "192.0.2.1:8080".parse().unwrap();
-    let error = busbar_gateway::start(site, Options { listen: Some(address) }).await.unwrap_err();
+    let error = busbar_gateway::start(site, Options { listen: Some(address), ..Options::default() })
+        .await
+        .unwrap_err();
     assert_eq!(
         error.to_string(),
         "cannot listen on 192.0.2.1:8080: this machine does not have that address; write one of its own, or 0.0.0.0 \

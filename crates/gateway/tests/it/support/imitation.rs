@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::ops::RangeInclusive;
 use std::sync::{Arc, Mutex};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
@@ -24,6 +24,12 @@ pub(crate) struct Behaviour {
     pub(crate) mute: Option<RangeInclusive<u16>>,
     /// Answers every read with this exception.
     pub(crate) exception: Option<u8>,
+    /// Answers a read of anything else with exception 2: it is of this profile.
+    pub(crate) family: Option<&'static str>,
+    /// Answers each read after so long.
+    pub(crate) delay: Duration,
+    /// Connections so far.
+    pub(crate) connections: usize,
     /// Answers a read of any of these with exception 2.
     pub(crate) unknown: Option<RangeInclusive<u16>>,
     /// Cuts every answer to so many registers.
@@ -95,6 +101,7 @@ async fn serve(listener: TcpListener, behaviour: Arc<Mutex<Behaviour>>) {
     let mut connections = tokio::task::JoinSet::new();
     loop {
         let (stream, _) = listener.accept().await.unwrap();
+        behaviour.lock().unwrap().connections += 1;
         connections.spawn(connection(stream, Arc::clone(&behaviour)));
     }
 }
@@ -104,6 +111,10 @@ async fn connection(mut stream: TcpStream, behaviour: Arc<Mutex<Behaviour>>) {
     while stream.read_exact(&mut request).await.is_ok() {
         let out = answer(&mut behaviour.lock().unwrap(), &request);
         let Some(out) = out else { continue };
+        let delay = behaviour.lock().unwrap().delay;
+        if !delay.is_zero() {
+            tokio::time::sleep(delay).await;
+        }
         if stream.write_all(&out).await.is_err() {
             return;
         }
@@ -137,7 +148,10 @@ fn answer(device: &mut Behaviour, request: &[u8; 12]) -> Option<Vec<u8>> {
     if touches(&device.mute) {
         return None;
     }
-    let unknown = touches(&device.unknown);
+    let foreign = device
+        .family
+        .is_some_and(|family| !busbar_profile::builtin(family).unwrap().wire.is_readable(address, count));
+    let unknown = foreign || touches(&device.unknown);
     if let Some(code) = device.exception.or(unknown.then_some(2)) {
         return Some(frame(request, request[6], &[0x83, code]));
     }

@@ -5,7 +5,7 @@ mod imitation;
 
 use std::time::Duration;
 
-use busbar_gateway::{Gateway, Options, Site};
+use busbar_gateway::{Gateway, Limits, Options, Site};
 use serde_json::Value;
 
 pub(crate) use self::client::{Client, Event, Stream};
@@ -29,9 +29,15 @@ impl Bench {
 
     /// The same, with the device prepared before it is first asked.
     pub(crate) async fn with(prepare: impl FnOnce(&mut Behaviour)) -> Self {
+        Self::bound(prepare, None).await
+    }
+
+    /// The same, with other limits for clients.
+    pub(crate) async fn bound(prepare: impl FnOnce(&mut Behaviour), limits: Option<Limits>) -> Self {
         let device = Imitation::start().await;
         device.change(prepare);
-        let (gateway, client) = start(&site(&format!("tcp://{}", device.address()))).await;
+        let site = site(&format!("tcp://{}", device.address()));
+        let (gateway, client) = start_with(&site, Options { limits, ..Options::default() }).await;
         Self { device, gateway, client }
     }
 
@@ -79,8 +85,12 @@ pub(crate) fn site(endpoint: &str) -> String {
 }
 
 pub(crate) async fn start(site: &str) -> (Gateway, Client) {
+    start_with(site, Options::default()).await
+}
+
+async fn start_with(site: &str, options: Options) -> (Gateway, Client) {
     let site = Site::parse("bench.toml", site).unwrap();
-    let gateway = busbar_gateway::start(site, Options::default()).await.unwrap();
+    let gateway = busbar_gateway::start(site, options).await.unwrap();
     let client = Client::new(gateway.address());
     (gateway, client)
 }

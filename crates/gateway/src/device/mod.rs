@@ -1,22 +1,24 @@
-//! The live state of one device: its registers, values with quality and time, and active alarms.
+//! The live state of one device: who it is, its registers, values with quality and time, and active alarms.
 //!
 //! No wire and no clock in here: finished poll rounds and the time come in, what has changed comes out.
+
+mod identity;
+mod view;
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use busbar_profile::plan::Read;
-use busbar_profile::{Decoded, Image, Profile, Quality, Rate, reading};
+use busbar_profile::{Decoded, Image, Quality, Rate};
 
+pub(crate) use self::identity::{Check, Expected, Finding, Known, Question};
+pub(crate) use self::view::points_view;
 use crate::alarms::{self, Alarms};
-use crate::api::types::{
-    AlarmView, BitView, ChoiceView, DeviceView, GroupView, Identity, IdentityView, JoinedPointView,
-    JoinedView, ModeView, NameplateView, PointView, PointsView, StateView, Time, ValueView,
-};
+use crate::api::types::{DeviceView, Identity, IdentityView, Time};
 use crate::failure::Failure;
-use crate::joined::{self, Joined};
+use crate::joined::Joined;
 use crate::poll_plan::polled;
-use crate::rates::{POLLED, Rates};
+use crate::rates::{RATES, Rates};
 use crate::site::SiteDevice;
 
 /// A value is stale after so many missed rounds...
@@ -25,8 +27,10 @@ const STALE_ROUNDS: u32 = 3;
 const STALE_AT_LEAST: Duration = Duration::from_secs(5);
 
 /// What one poll round brought.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Round {
+    /// Who answered, where that was asked before all else.
+    pub(crate) identity: Option<Known>,
     /// What was due.
     pub(crate) rates: Rates,
     /// Registers that came, by address.
@@ -35,6 +39,10 @@ pub(crate) struct Round {
     pub(crate) failures: Vec<(Read, Failure)>,
     /// Set when the device, not just a read, could not be reached.
     pub(crate) silence: Option<Failure>,
+    /// Whether it was cut short, so that it says nothing about what is missing.
+    pub(crate) is_cut: bool,
+    /// How long it took, of what is read on demand: one picture may take as long as many rounds.
+    pub(crate) took: Duration,
 }
 
 impl Round {
@@ -45,7 +53,9 @@ impl Round {
 
     /// Whether the device answered anything at all, if only to refuse.
     pub(crate) fn reached_the_device(&self) -> bool {
-        !self.answers.is_empty() || self.failures.iter().any(|(_, failure)| failure.device_answered())
+        self.identity.is_some()
+            || !self.answers.is_empty()
+            || self.failures.iter().any(|(_, failure)| failure.device_answered())
     }
 }
 
@@ -66,6 +76,7 @@ pub(crate) struct Changes {
 #[derive(Debug)]
 pub(crate) struct Device {
     site: SiteDevice,
+    expected: Expected,
     /// Id of its wire.
     wire: String,
     image: Image,
@@ -73,10 +84,14 @@ pub(crate) struct Device {
     points: Vec<Point>,
     /// By index in the profile's joined signals.
     joined: Vec<Joined>,
-    /// Indexes of the polled points, for each of [`POLLED`].
-    polled: [Vec<usize>; POLLED.len()],
-    /// When the last round was finished that the device answered, for each of [`POLLED`].
-    rounds: [Option<Time>; POLLED.len()],
+    /// Indexes of the points that come in parts.
+    long: Vec<usize>,
+    /// Indexes of the points that are read, for each of [`RATES`].
+    read: [Vec<usize>; RATES.len()],
+    /// When the last round was finished that the device answered, for each of [`RATES`].
+    rounds: [Option<Time>; RATES.len()],
+    /// How long the last round took that was read on demand.
+    took: Duration,
     state: Option<usize>,
     mode: Option<usize>,
     alarms: Alarms,
@@ -88,6 +103,11 @@ pub(crate) struct Device {
     silence: Option<Arc<Failure>>,
     last_seen: Option<Time>,
     model: Option<&'static str>,
+    identity: IdentityView,
+    /// Who it said it is in a round that was not about that.
+    claim: Option<Known>,
+    /// What was last told of it.
+    told: Option<DeviceView>,
 }
 
 /// What is known of one point.
@@ -123,13 +143,15 @@ impl Device {
         let signal = |signal: &str| profile.points.iter().position(|p| p.signal.as_deref() == Some(signal));
         // What has an engine is in that engine's state; of a transfer switch the transfer is what matters.
         let states = ["state.engine", "state.transfer"];
-        Self {
+        let mut device = Self {
             wire,
             image: Image::new(profile),
             points: vec![Point::UNREAD; profile.points.len()],
             joined: vec![Joined::default(); profile.joined().len()],
-            polled: POLLED.map(|rate| polled(profile, rate)),
-            rounds: [None; POLLED.len()],
+            long: (0..profile.points.len()).filter(|index| comes_in_parts(profile, *index)).collect(),
+            read: RATES.map(|rate| polled(profile, rate)),
+            rounds: [None; RATES.len()],
+            took: Duration::ZERO,
             state: states.into_iter().find_map(signal),
             mode: signal("mode"),
             alarms: Alarms::default(),
@@ -139,8 +161,14 @@ impl Device {
             silence: None,
             last_seen: None,
             model: None,
+            identity: IdentityView { verdict: Identity::Unknown, detail: None, checked: None },
+            claim: None,
+            told: None,
+            expected: Expected::of(&site),
             site,
-        }
+        };
+        device.told = Some(device.view());
+        device
     }
 
     pub(crate) fn site(&self) -> &SiteDevice {
@@ -160,32 +188,50 @@ impl Device {
         self.fault.as_deref()
     }
 
+    /// What the site file expects of it beside its profile.
+    pub(crate) fn expected(&self) -> &Expected {
+        &self.expected
+    }
+
+    /// Whether another device answers in its place.
+    pub(crate) fn is_wrong(&self) -> bool {
+        self.identity.verdict == Identity::Wrong
+    }
+
     /// Takes over a finished round.
     pub(crate) fn finish(&mut self, mut round: Round, now: Duration, ts: Time) -> Changes {
-        let before = self.view();
         let mut changes = Changes::default();
-        self.reached(&mut round, ts);
-        let covered = self.store(&round, (now, ts), &mut changes);
-        match self.silence.clone() {
-            Some(failure) => {
-                let all = self.polled.concat();
-                self.fail(&all, &failure, &mut changes.values);
+        if let Some(known) = round.identity.take() {
+            self.last_seen = Some(ts);
+            self.identified(known, ts, &mut changes);
+        }
+        if !self.is_wrong() {
+            self.reached(&mut round, ts);
+            let covered = self.store(&round, (now, ts), &mut changes);
+            match self.silence.clone() {
+                Some(failure) => {
+                    let all: Vec<usize> =
+                        self.read.iter().flatten().copied().filter(|index| self.shows(*index)).collect();
+                    self.fail(&all, &failure, &mut changes.values);
+                }
+                None => self.fail_uncovered(&round, &covered, &mut changes.values),
             }
-            None => self.fail_uncovered(&round, &covered, &mut changes.values),
+            self.join(&covered, ts);
+            if let Some(claim) = self.claim.take() {
+                self.identified(claim, ts, &mut changes);
+            }
         }
         changes.values.sort_unstable();
         changes.values.dedup();
-        self.join(&covered, ts);
         changes.joined = self.rejudge();
-        changes.device = !same_but_last_seen(&before, self.view());
+        changes.device = self.is_news();
         changes
     }
 
     /// Marks what is older than its poll allows.
     pub(crate) fn expire(&mut self, now: Duration) -> Vec<(Rate, Changes)> {
-        let before = self.view();
         let mut expired = Vec::new();
-        for (rate, points) in POLLED.iter().zip(&self.polled) {
+        for (rate, points) in RATES.iter().zip(&self.read) {
             let Some(limit) = self.stale_after(*rate) else { continue };
             let mut changes = Changes::default();
             for index in points {
@@ -202,17 +248,61 @@ impl Device {
                 expired.push((*rate, changes));
             }
         }
-        if let Some((_, changes)) = expired.last_mut() {
-            changes.joined = self.rejudge();
-            changes.device = !same_but_last_seen(&before, self.view());
+        if !expired.is_empty() {
+            let (joined, device) = (self.rejudge(), self.is_news());
+            if let Some((_, last)) = expired.last_mut() {
+                (last.joined, last.device) = (joined, device);
+            }
         }
         expired
+    }
+
+    /// Whether the device's own view is another than was last told. That a device which answers has been seen again
+    /// and again is no news.
+    fn is_news(&mut self) -> bool {
+        let view = self.view();
+        let Some(told) = &mut self.told else { return true };
+        told.last_seen = view.last_seen;
+        told.identity.checked = view.identity.checked;
+        let news = *told != view;
+        *told = view;
+        news
     }
 
     /// When the last round of a rate was; what is good of that rate was all read then, or since then on the way to
     /// something else.
     pub(crate) fn last_round(&self, rate: Rate) -> Option<Time> {
-        POLLED.iter().zip(&self.rounds).find(|(polled, _)| **polled == rate).and_then(|(_, ts)| *ts)
+        RATES.iter().zip(&self.rounds).find(|(known, _)| **known == rate).and_then(|(_, ts)| *ts)
+    }
+
+    /// Who answers is known now. Of another device nothing is taken, and nothing is kept of the one before it.
+    fn identified(&mut self, known: Known, ts: Time, changes: &mut Changes) {
+        let Known { verdict, detail, model } = known;
+        let is_news = self.identity.detail.as_ref() != Some(&detail);
+        self.identity = IdentityView { verdict, detail: Some(detail.clone()), checked: Some(ts) };
+        self.named(model, changes);
+        if verdict != Identity::Wrong {
+            return;
+        }
+        self.online = true;
+        self.silence = None;
+        if !is_news && self.fault.is_some() {
+            return;
+        }
+        self.fault = Some(format!(
+            "{} is not what the site file says: {detail}; connect the right device, or correct its unit, profile or model in the site file",
+            self.site.name
+        ));
+        let reason = Arc::new(Failure::Wrong { detail });
+        for index in 0..self.points.len() {
+            if self.shows(index) {
+                self.points[index] = Point { failure: Some(Arc::clone(&reason)), ..Point::UNREAD };
+                changes.values.push(index);
+            }
+        }
+        self.image = Image::new(self.site.profile);
+        self.joined.iter_mut().for_each(|joined| joined.read(None));
+        changes.alarms |= std::mem::take(&mut self.alarms) != Alarms::default();
     }
 
     /// Whether the device answered, and what to say if it did not.
@@ -227,10 +317,13 @@ impl Device {
                 // Nothing was due: nothing is known.
                 return;
             }
-            for (rate, last) in POLLED.iter().zip(&mut self.rounds) {
+            for (rate, last) in RATES.iter().zip(&mut self.rounds) {
                 if round.rates.contains(*rate) {
                     *last = Some(ts);
                 }
+            }
+            if round.rates.contains(Rate::OnDemand) {
+                self.took = round.took;
             }
             self.online = true;
             self.silence = None;
@@ -247,21 +340,27 @@ impl Device {
             self.silence = Some(Arc::new(failure));
         }
         self.online = false;
+        // Who knows who answers when somebody does again.
+        (self.identity.verdict, self.identity.detail) = (Identity::Unknown, None);
     }
 
     /// Stores the answers; returns which points were wholly in them.
     fn store(&mut self, round: &Round, read: (Duration, Time), changes: &mut Changes) -> Vec<bool> {
         let profile = self.site.profile;
         let mut dirty = Vec::new();
+        let windows = windows(&round.answers);
+        let halves = self.halves(&windows);
         for (address, registers) in &round.answers {
-            self.image.store(*address, registers, &mut dirty);
+            for (address, registers) in outside(&halves, *address, registers) {
+                self.image.store(address, registers, &mut dirty);
+            }
         }
         for index in dirty {
             self.points[index].dirty = true;
         }
 
         let mut covered = vec![false; self.points.len()];
-        for (first, end) in windows(&round.answers) {
+        for (first, end) in windows {
             let start = profile.points.partition_point(|point| u32::from(point.address) < first);
             for (index, about) in profile.points.iter().enumerate().skip(start) {
                 if u32::from(about.address) >= end {
@@ -275,6 +374,19 @@ impl Device {
             }
         }
         covered
+    }
+
+    /// The registers of long points that did not come whole: half of a picture does not go with half of the one before.
+    fn halves(&self, windows: &[(u32, u32)]) -> Vec<(u32, u32)> {
+        let span = |index: &usize| {
+            let point = &self.site.profile.points[*index];
+            (u32::from(point.address), u32::from(point.address) + u32::from(point.registers))
+        };
+        let is_half = |(first, end): &(u32, u32)| {
+            let touched = windows.iter().any(|window| window.0 < *end && *first < window.1);
+            touched && !windows.iter().any(|window| window.0 <= *first && *end <= window.1)
+        };
+        self.long.iter().map(span).filter(is_half).collect()
     }
 
     /// A point was read: decodes it if its registers changed.
@@ -301,30 +413,38 @@ impl Device {
         if let Some(bits) = point.decoded.value.as_ref().and_then(|value| value.as_bits()) {
             changes.alarms |= self.alarms.update(self.site.profile, index, bits, read.1);
         }
-        self.identify(index, changes);
+        self.identify(index);
     }
 
-    /// The model, when the point that names it was read.
-    fn identify(&mut self, index: usize, changes: &mut Changes) {
+    /// Who it says it is, when the point that names the model was read.
+    fn identify(&mut self, index: usize) {
         let profile = self.site.profile;
-        if profile.identity.as_ref().is_some_and(|identity| identity.point == index) {
-            let registers = self.image.registers(index);
-            let code = registers.and_then(|r| profile.points[index].raw_code(r, self.site.word_order));
-            let model = code.and_then(|code| profile.model(u16::try_from(code).ok()?));
-            if std::mem::replace(&mut self.model, model) != model {
-                // What a code means may depend on the model.
-                let renamed =
-                    |point: &busbar_profile::Point| point.choices.iter().any(|c| !c.by_model.is_empty());
-                let points = profile.points.iter().enumerate().filter(|(_, point)| renamed(point));
-                let read = points.map(|(index, _)| index).filter(|index| self.points[*index].read.is_some());
-                changes.values.extend(read);
-            }
+        if profile.identity.as_ref().is_none_or(|identity| identity.point != index) {
+            return;
         }
+        let registers = self.image.registers(index);
+        if let Some(code) = registers.and_then(|r| profile.points[index].raw_code(r, self.site.word_order)) {
+            self.claim = Some(identity::named(profile, code, self.expected.model.as_deref()));
+        }
+    }
+
+    fn named(&mut self, model: Option<&'static str>, changes: &mut Changes) {
+        if std::mem::replace(&mut self.model, model) == model {
+            return;
+        }
+        // What a code means may depend on the model.
+        let renamed = |point: &busbar_profile::Point| point.choices.iter().any(|c| !c.by_model.is_empty());
+        let points = self.site.profile.points.iter().enumerate().filter(|(_, point)| renamed(point));
+        let read = points.map(|(index, _)| index).filter(|index| self.points[*index].read.is_some());
+        changes.values.extend(read);
     }
 
     /// The points of the round that did not come take the failure of the read they were in.
     fn fail_uncovered(&mut self, round: &Round, covered: &[bool], changed: &mut Vec<usize>) {
-        let due = POLLED.iter().zip(&self.polled).filter(|(rate, _)| round.rates.contains(**rate));
+        if round.failures.is_empty() {
+            return;
+        }
+        let due = RATES.iter().zip(&self.read).filter(|(rate, _)| round.rates.contains(**rate));
         let missing: Vec<usize> =
             due.flat_map(|(_, points)| points).copied().filter(|index| !covered[*index]).collect();
         for (read, failure) in &round.failures {
@@ -378,196 +498,41 @@ impl Device {
         let interval = match rate {
             Rate::Fast => self.site.poll.fast,
             Rate::Slow => self.site.poll.slow,
-            Rate::Once | Rate::OnDemand => return None,
+            Rate::OnDemand => self.site.poll.fast.max(self.took),
+            Rate::Once => return None,
         };
         Some(interval.saturating_mul(STALE_ROUNDS).max(STALE_AT_LEAST))
     }
 
     /// A point's value when it can be relied on now.
-    fn good(&self, index: usize) -> Option<&busbar_profile::Value> {
+    pub(crate) fn good(&self, index: usize) -> Option<&busbar_profile::Value> {
         let point = &self.points[index];
         point.decoded.value.as_ref().filter(|_| point.quality() == Quality::Good)
     }
 }
 
-/// What the API shows of a device.
-impl Device {
-    pub(crate) fn view(&self) -> DeviceView {
-        let SiteDevice { id, name, profile, unit, .. } = &self.site;
-        DeviceView {
-            id: id.clone(),
-            name: name.clone(),
-            profile: profile.key.clone(),
-            vendor: profile.vendor.clone(),
-            kind: profile.kind.into(),
-            model: self.model.map(str::to_owned),
-            models: profile.models.clone(),
-            wire: self.wire.clone(),
-            unit: *unit,
-            online: self.online,
-            fault: self.fault.clone(),
-            state: self.state.and_then(|index| self.state_view(index)),
-            mode: self.mode.and_then(|index| self.mode_view(index)),
-            alarms: self.alarms.counts(),
-            alarms_fault: self.alarms_fault(),
-            last_seen: self.last_seen,
-            identity: IdentityView { verdict: Identity::Unknown, detail: None, checked: None },
-            desired: None,
-            nameplate: NameplateView::default(),
-        }
-    }
-
-    /// What is wrong with the first point that alarms are read from and that is not good.
-    fn alarms_fault(&self) -> Option<String> {
-        let bad = |index: &&usize| self.points[**index].quality() != Quality::Good;
-        let index = *self.alarm_points.iter().find(bad)?;
-        let (id, point) = (&self.site.profile.points[index].id, &self.points[index]);
-        Some(match &point.failure {
-            Some(failure) => format!("{id}: {failure}"),
-            None if point.read.is_none() => format!("{id}: not read yet"),
-            None => format!("{id}: not read for too long"),
-        })
-    }
-
-    fn state_view(&self, index: usize) -> Option<StateView> {
-        let point = &self.site.profile.points[index];
-        let code = self.good(index)?.as_code()?;
-        let choice = point.choice(code);
-        // A timer that does not run in this state holds whatever it held before.
-        let timer = point.timer.filter(|_| choice.is_some_and(|choice| choice.timed));
-        Some(StateView {
-            code,
-            label: point.label(code, self.model).into_owned(),
-            canonical: choice.and_then(|choice| choice.state.clone()),
-            timer_s: timer.and_then(|timer| self.good(timer)?.as_number()),
-        })
-    }
-
-    fn mode_view(&self, index: usize) -> Option<ModeView> {
-        let point = &self.site.profile.points[index];
-        let value = self.good(index)?;
-        if let Some(code) = value.as_code() {
-            let label = point.label(code, self.model).into_owned();
-            let canonical = point.choice(code).and_then(|choice| choice.state.clone());
-            return Some(ModeView { code, label, canonical });
-        }
-        // A word of bits has one bit for each mode, or one bit for two.
-        let set = value.as_bits()?;
-        point.bits.iter().find_map(|bit| {
-            let (label, state) = match (set.contains(bit.bit), &bit.clear) {
-                (true, _) => (&bit.label, bit.state.as_ref()?),
-                (false, Some(clear)) => (&clear.label, &clear.state),
-                (false, None) => return None,
-            };
-            Some(ModeView { code: bit.bit.into(), label: label.clone(), canonical: Some(state.clone()) })
-        })
-    }
-
-    pub(crate) fn alarm_views(&self) -> Vec<AlarmView> {
-        self.alarms.views(&self.site.id, self.site.profile)
-    }
-
-    /// Whether a point has a value to show: it is polled, or was read on demand.
-    pub(crate) fn shows(&self, index: usize) -> bool {
-        let about = &self.site.profile.points[index];
-        about.access.is_readable() && (about.rate != Rate::OnDemand || self.points[index].read.is_some())
-    }
-
-    /// Every value there is, in address order.
-    pub(crate) fn values(&self) -> Vec<ValueView> {
-        (0..self.points.len()).filter(|index| self.shows(*index)).map(|index| self.value(index)).collect()
-    }
-
-    /// Every signal that several points make up, in the order of the profile.
-    pub(crate) fn joined_views(&self) -> Vec<JoinedView> {
-        (0..self.joined.len()).map(|index| self.joined(index)).collect()
-    }
-
-    pub(crate) fn joined(&self, index: usize) -> JoinedView {
-        self.joined[index].view(&self.site.profile.joined()[index])
-    }
-
-    pub(crate) fn value(&self, index: usize) -> ValueView {
-        let about = &self.site.profile.points[index];
-        let point = &self.points[index];
-        let raw = self.image.registers(index).filter(|_| point.read.is_some());
-        let reading = reading(about, &point.decoded, raw.unwrap_or_default(), self.model);
-        ValueView {
-            id: about.id.clone(),
-            value: reading.value.map(Into::into).unwrap_or_default(),
-            code: reading.code,
-            set: reading.set,
-            unit: about.unit.clone(),
-            quality: point.quality().into(),
-            ts: point.read.map(|(_, ts)| ts),
-            error: point.failure.as_ref().map(|failure| failure.to_string()),
-            raw: raw.map(<[u16]>::to_vec),
-        }
-    }
+/// Whether a point is longer than a read may be.
+fn comes_in_parts(profile: &busbar_profile::Profile, index: usize) -> bool {
+    let point = &profile.points[index];
+    point.access.is_readable() && point.registers > profile.wire.max_read
 }
 
-/// What there is to read of a device of this profile.
-pub(crate) fn points_view(profile: &Profile) -> PointsView {
-    let groups = profile.groups.iter().map(|group| GroupView {
-        id: group.id.clone(),
-        title: group.title.clone(),
-        rate: group.rate.into(),
-        points: group
-            .points
-            .iter()
-            .map(|index| &profile.points[*index])
-            .filter(|point| point.access.is_readable())
-            .map(point_view)
-            .collect(),
-    });
-    PointsView {
-        groups: groups.filter(|group| !group.points.is_empty()).collect(),
-        joined: profile.joined().iter().map(|signal| joined_point_view(profile, signal)).collect(),
-    }
-}
-
-fn joined_point_view(profile: &Profile, signal: &busbar_profile::Joined) -> JoinedPointView {
-    let about = busbar_profile::vocabulary::vocabulary().signal(&signal.signal);
-    JoinedPointView {
-        signal: signal.signal.clone(),
-        meaning: about.map(|about| about.meaning.clone()).unwrap_or_default(),
-        unit: about.and_then(|about| about.unit.clone()),
-        rate: joined::rate(profile, signal).into(),
-        points: signal.points().map(|index| profile.points[index].id.clone()).collect(),
-    }
-}
-
-fn point_view(point: &busbar_profile::Point) -> PointView {
-    let choice =
-        |choice: &busbar_profile::Choice| ChoiceView { value: choice.value, label: choice.label.clone() };
-    let bit = |bit: &busbar_profile::Bit| BitView {
-        bit: bit.bit,
-        id: bit.id.clone(),
-        label: bit.label.clone(),
-        class: bit.class.map(Into::into),
-        signal: bit.signal.clone(),
-    };
-    PointView {
-        id: point.id.clone(),
-        name: point.name.clone(),
-        address: point.address,
-        plc: point.plc_number(),
-        registers: point.registers,
-        unit: point.unit.clone(),
-        data_type: point.data_type.into(),
-        rate: point.rate.into(),
-        signal: point.signal.clone(),
-        doubt: point.doubt.clone(),
-        page: point.page,
-        choices: point.choices.iter().map(choice).collect(),
-        bits: point.bits.iter().map(bit).collect(),
-    }
-}
-
-/// A device that answers has been seen again and again; that alone is no news.
-fn same_but_last_seen(before: &DeviceView, mut after: DeviceView) -> bool {
-    after.last_seen = before.last_seen;
-    *before == after
+/// What of an answer lies outside all of `spans`, which ascend.
+fn outside<'a>(
+    spans: &'a [(u32, u32)],
+    address: u16,
+    registers: &'a [u16],
+) -> impl Iterator<Item = (u16, &'a [u16])> {
+    let end = u32::from(address) + registers.len() as u32;
+    let starts = std::iter::once(u32::from(address)).chain(spans.iter().map(|span| span.1));
+    let ends = spans.iter().map(|span| span.0).chain([end]);
+    starts.zip(ends).filter_map(move |(from, to)| {
+        let (from, to) = (from.max(u32::from(address)), to.min(end));
+        let first = u16::try_from(from).ok()?;
+        let part = registers
+            .get((from - u32::from(address)) as usize..to.checked_sub(u32::from(address))? as usize)?;
+        (!part.is_empty()).then_some((first, part))
+    })
 }
 
 /// Address ranges that the answers cover, first and behind the last; answers that touch are one.
