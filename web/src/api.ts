@@ -122,10 +122,16 @@ export interface paths {
         };
         /**
          * What happens, as it happens: server-sent events.
-         * @description First `snapshot` (`SnapshotEvent`); then `values` (`ValuesEvent`) once a finished poll round of a device,
-         *     `device` (`DeviceView`) when a device changed and `alarms` (`AlarmsEvent`) when its active alarms did. A comment
-         *     keeps the connection alive each 15 seconds. A reader that falls behind gets a new `snapshot` in place of
-         *     the events it missed.
+         * @description First `snapshot` (`SnapshotEvent`), then one `state` (`StateEvent`) for each of its devices; from then on `values`
+         *     (`ValuesEvent`) once a poll round of a device is finished, `device` (`DeviceView`) when a device changed, `alarms`
+         *     (`AlarmsEvent`) when its active alarms did, and `site` (`SiteInfo`) when a site file was accepted or refused. Other
+         *     devices or wires begin with `snapshot` again. A round that brought nothing that is asked for is told of with
+         *     nothing in it as long as something that is asked for is read at its rate.
+         *
+         *     The last event of a snapshot and all later ones have an id. A reader that comes back with one gets `resumed`
+         *     (`ResumedEvent`) and what it missed, or a `snapshot` where that is not known any more. A reader that falls behind
+         *     gets `device`, `alarms` and `state` of each device in place of the events it missed. A comment keeps the connection
+         *     alive each 15 seconds. The stream is compressed with gzip for those who accept it.
          */
         get: operations["events"];
         put?: never;
@@ -420,15 +426,6 @@ export interface components {
              * @example auto
              */
             mode: string;
-        };
-        /** @description One device in a snapshot. */
-        DeviceSnapshot: {
-            /** @description The device. */
-            device: components["schemas"]["DeviceView"];
-            /** @description What several of its points make up. */
-            joined: components["schemas"]["JoinedView"][];
-            /** @description Its values, in address order. */
-            values: components["schemas"]["ValueView"][];
         };
         /** @description One controller as it stands now. */
         DeviceView: {
@@ -924,6 +921,8 @@ export interface components {
              */
             reason: string;
         };
+        /** @description `event: resumed`: what the reader has still holds, and what it missed follows. */
+        ResumedEvent: Record<string, never>;
         /** @description The site, without its devices. */
         SiteInfo: {
             /** @description Which site file runs. */
@@ -959,14 +958,35 @@ export interface components {
             /** @description How it is connected. */
             diagram: components["schemas"]["DiagramView"];
         };
-        /** @description `event: snapshot`: everything, sent first and again after a reader fell behind. */
+        /**
+         * @description `event: snapshot`: the site and its devices. A `state` of each of them follows.
+         *
+         *     It comes first, and again when the site file in force has other devices or wires.
+         */
         SnapshotEvent: {
             /** @description Their active alarms, the gravest first. */
             alarms: components["schemas"]["AlarmView"][];
             /** @description The devices asked for, in the order of the site file. */
-            devices: components["schemas"]["DeviceSnapshot"][];
+            devices: components["schemas"]["DeviceView"][];
             /** @description The site. */
             site: components["schemas"]["SiteInfo"];
+        };
+        /**
+         * @description `event: state`: all values asked for of one device, in place of those before.
+         *
+         *     One of each device follows a `snapshot`. A reader that falls behind gets a `device`, an `alarms` and a `state` of
+         *     each device in place of the events it missed.
+         */
+        StateEvent: {
+            /**
+             * @description Id of the device.
+             * @example gen1
+             */
+            device: string;
+            /** @description What several of its points make up. */
+            joined: components["schemas"]["JoinedView"][];
+            /** @description Its values, in address order. */
+            values: components["schemas"]["ValueView"][];
         };
         /** @description What a device is doing. */
         StateView: {
@@ -1121,14 +1141,14 @@ export interface components {
          *     Every point of that device and rate whose quality is `good` was read at `ts`, changed or not.
          */
         ValuesEvent: {
-            /** @description The points whose value or quality changed. */
+            /** @description The points whose value or quality changed, of those asked for. */
             changed: components["schemas"]["ValueView"][];
             /**
              * @description Id of the device.
              * @example gen1
              */
             device: string;
-            /** @description The joined signals whose value or quality changed. */
+            /** @description The joined signals whose value or quality changed, of those asked for. */
             joined: components["schemas"]["JoinedView"][];
             /** @description Which of its points were read. */
             rate: components["schemas"]["Rate"];
@@ -1941,12 +1961,32 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description Only this device.
-                 * @example gen1
+                 * @description Only these devices: ids with commas between them.
+                 * @example gen1,gen2
                  */
                 device?: string;
+                /**
+                 * @description Of the values only those of these groups: ids with commas between them. What is read on demand is read while a
+                 *     stream that names its group is open.
+                 * @example genset,display
+                 */
+                group?: string;
+                /**
+                 * @description Of the values only what carries one of these signals: ids of the shared vocabulary with commas between them.
+                 *     Those that a device does not have are passed over. With groups: what is in either.
+                 * @example genset.power.active,breaker.genset.closed
+                 */
+                signal?: string;
+                /**
+                 * @description Id of the last event that a reader has of this query: what it missed follows, if that is still known. The
+                 *     header `Last-Event-ID` counts before it.
+                 */
+                last_event_id?: string;
             };
-            header?: never;
+            header?: {
+                /** @description Id of the last event that the reader has */
+                "last-event-id"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -1961,7 +2001,7 @@ export interface operations {
                     "text/event-stream": string;
                 };
             };
-            /** @description The query is not understood */
+            /** @description The query is not understood, or names a group that there is not */
             400: {
                 headers: {
                     [name: string]: unknown;

@@ -3,7 +3,6 @@
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use busbar_link::OpenError;
@@ -12,6 +11,7 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
+use crate::events;
 use crate::hub::Hub;
 use crate::running::{Running, Unopened};
 use crate::server::{self, Limits};
@@ -71,7 +71,6 @@ pub struct Gateway {
     tasks: JoinSet<()>,
     hub: Arc<Hub>,
     running: Running,
-    heartbeats: Arc<AtomicU64>,
 }
 
 /// Starts the gateway of a site: opens its wires, polls its devices, and serves the API and the page.
@@ -91,12 +90,12 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     let hub = Arc::new(Hub::new(running.table(&site), stopped));
     let mut tasks = JoinSet::new();
     running.poll(Running::default(), &hub, &mut tasks);
-    let heartbeats = Arc::default();
-    tasks.spawn(age(Arc::clone(&hub), Arc::clone(&heartbeats)));
+    tasks.spawn(age(Arc::clone(&hub)));
+    tasks.spawn(events::beat(Arc::clone(&hub)));
     let service = server::Service { listener, address, limits: options.limits };
     tasks.spawn(server::serve(service, Arc::clone(&hub)));
     tracing::info!(%address, devices = site.devices.len(), "gateway started");
-    Ok(Gateway { address, asked: site.listen, stop, tasks, hub, running, heartbeats })
+    Ok(Gateway { address, asked: site.listen, stop, tasks, hub, running })
 }
 
 impl Gateway {
@@ -110,10 +109,9 @@ impl Gateway {
         self.hub.table().tally()
     }
 
-    /// Counts up each second, whenever the age of every value was looked at; it stands still when that, or any device,
-    /// hangs.
-    pub fn heartbeats(&self) -> u64 {
-        self.heartbeats.load(Ordering::Relaxed)
+    /// Whether it hangs: the age of its values, which is looked at each second with every device, was not for long.
+    pub fn hangs(&self) -> bool {
+        self.hub.health().hangs(self.hub.now()).is_some()
     }
 
     /// Goes on with another site file. A wire that it did not change stays open, a device that it did not change keeps
@@ -194,17 +192,14 @@ fn refused(address: SocketAddr, error: &io::Error) -> StartError {
 }
 
 /// Looks at the age of every value.
-async fn age(hub: Arc<Hub>, heartbeats: Arc<AtomicU64>) {
+async fn age(hub: Arc<Hub>) {
     let mut stop = hub.stop();
     let mut ticks = interval(AGEING);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         tokio::select! {
             () = stop.requested() => return,
-            _ = ticks.tick() => {
-                hub.expire();
-                heartbeats.fetch_add(1, Ordering::Relaxed);
-            }
+            _ = ticks.tick() => hub.expire(),
         }
     }
 }

@@ -3,22 +3,21 @@
 //! Every device has a lock of its own that is held for microseconds and never across an await, so a reader of the
 //! API holds up no poller and one device holds up no other.
 
-use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
 use axum::http::StatusCode;
 use busbar_profile::{Profile, Rate};
-use tokio::sync::broadcast;
 use tokio::time::Instant;
 
 use crate::api::types::{
-    AlarmView, AlarmsEvent, ConfigView, DeviceSnapshot, DeviceView, JoinedView, PointsView, RefusedView,
-    SiteInfo, SiteView, SnapshotEvent, Time, ValueView, ValuesEvent, WireDetailView, WireView,
+    AlarmView, AlarmsEvent, ConfigView, DeviceView, JoinedView, PointsView, RefusedView, SiteInfo, SiteView,
+    Time, ValueView, WireDetailView, WireView,
 };
 use crate::api::{PointsQuery, Problem, ValuesQuery};
 use crate::device::{Changes, Device, Round, points_view};
-use crate::events::{Event, frame};
+use crate::events::{Channel, Draft};
 use crate::health::Health;
 use crate::joined;
 use crate::poll_plan::Overview;
@@ -32,9 +31,11 @@ use crate::wires;
 #[derive(Debug)]
 pub(crate) struct Hub {
     table: RwLock<Arc<Table>>,
+    /// Counts the tables that had other devices or wires than the one before.
+    generation: AtomicU64,
     config: Mutex<Config>,
     started: Time,
-    events: broadcast::Sender<Arc<Event>>,
+    channel: Channel,
     stop: Stop,
     origin: Instant,
     health: Health,
@@ -49,14 +50,13 @@ struct Config {
 
 impl Hub {
     pub(crate) fn new(table: Table, stop: Stop) -> Self {
-        // Room for the events of a few seconds; a reader that is further behind gets a snapshot, which costs less.
-        let capacity = (table.devices.len() * 8).clamp(256, 16_384);
         let now = wall_clock();
         Self {
             table: RwLock::new(Arc::new(table)),
+            generation: AtomicU64::new(0),
             config: Mutex::new(Config { revision: 1, view: ConfigView { loaded: now, refused: None } }),
             started: now,
-            events: broadcast::Sender::new(capacity),
+            channel: Channel::default(),
             stop,
             origin: Instant::now(),
             health: Health::default(),
@@ -90,16 +90,26 @@ impl Hub {
             config.revision += 1;
             config.view = ConfigView { loaded: wall_clock(), refused: None };
         }
+        let same = self.table().is_same(&table);
         *self.table.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(table);
-        self.tell(Event::Exchanged);
+        if same {
+            self.tell(Draft::site(&self.info()));
+        } else {
+            // Behind the table: who knows of the generation finds the table, or a newer one.
+            let generation = self.generation.fetch_add(1, Ordering::SeqCst) + 1;
+            self.tell([Draft::exchanged(generation)]);
+        }
     }
 
     /// A newer site file was refused; the one before it goes on.
     pub(crate) fn refuse(&self, reason: String) {
         self.config().view.refused = Some(RefusedView { at: wall_clock(), reason });
-        let mut frames = Vec::new();
-        frame(&mut frames, "site", &self.info());
-        self.tell(Event::Site { frames: frames.into() });
+        self.tell(Draft::site(&self.info()));
+    }
+
+    /// Which devices and wires there are, as a number: another one when they are others.
+    pub(crate) fn generation(&self) -> u64 {
+        self.generation.load(Ordering::SeqCst)
     }
 
     fn config(&self) -> MutexGuard<'_, Config> {
@@ -135,36 +145,33 @@ impl Hub {
 
     fn publish(&self, slot: &Slot, live: &mut Live, rounds: &[(Rate, Time, Changes)]) {
         live.sequence += 1;
-        if self.events.receiver_count() == 0 {
+        if !self.channel.listens(self.now()) {
             return;
         }
-        let device = &live.device;
-        let id = &device.site().id;
-        let mut frames = Vec::new();
+        let (of, device) = ((slot.key, live.sequence), &live.device);
+        let mut drafts = Vec::new();
         for (rate, ts, changes) in rounds {
-            let changed = changes.values.iter().filter(|point| device.shows(**point));
-            let values = ValuesEvent {
-                device: id.clone(),
-                rate: (*rate).into(),
-                ts: *ts,
-                changed: changed.map(|point| device.value(*point)).collect(),
-                joined: changes.joined.iter().map(|signal| device.joined(*signal)).collect(),
-            };
-            frame(&mut frames, "values", &values);
+            drafts.push(Draft::values(of, device, (*rate, *ts), changes));
             if changes.alarms {
-                let alarms = AlarmsEvent { device: id.clone(), alarms: device.alarm_views() };
-                frame(&mut frames, "alarms", &alarms);
+                let alarms = AlarmsEvent { device: slot.id.clone(), alarms: device.alarm_views() };
+                drafts.push(Draft::device(of, "alarms", &alarms));
             }
             if changes.device {
-                frame(&mut frames, "device", &device.view());
+                drafts.push(Draft::device(of, "device", &device.view()));
             }
         }
-        self.tell(Event::Device { key: slot.key, sequence: live.sequence, frames: frames.into() });
+        self.channel.tell(drafts.into_iter().flatten());
     }
 
-    fn tell(&self, event: Event) {
-        // Nobody listening is no error.
-        let _ = self.events.send(Arc::new(event));
+    fn tell(&self, drafts: impl IntoIterator<Item = Draft>) {
+        if self.channel.listens(self.now()) {
+            self.channel.tell(drafts);
+        }
+    }
+
+    /// What is told to the readers of the event stream.
+    pub(crate) fn channel(&self) -> &Channel {
+        &self.channel
     }
 }
 
@@ -272,37 +279,15 @@ impl Hub {
     pub(crate) fn device(&self, id: &str) -> Result<Arc<Slot>, Problem> {
         self.table().device(id).map(Arc::clone)
     }
-
-    /// Everything as it stands, and how to go on from there: the events that come after it, by device.
-    pub(crate) fn snapshot(&self, only: Option<u64>) -> (SnapshotEvent, HashMap<u64, u64>) {
-        let mut snapshot = SnapshotEvent { site: self.info(), devices: Vec::new(), alarms: Vec::new() };
-        let mut sequences = HashMap::new();
-        for slot in &self.table().devices {
-            if only.is_some_and(|only| only != slot.key) {
-                continue;
-            }
-            let live = slot.lock();
-            sequences.insert(slot.key, live.sequence);
-            let device = DeviceSnapshot {
-                device: live.device.view(),
-                values: live.device.values(),
-                joined: live.device.joined_views(),
-            };
-            snapshot.devices.push(device);
-            snapshot.alarms.extend(live.device.alarm_views());
-        }
-        gravest_first(&mut snapshot.alarms);
-        (snapshot, sequences)
-    }
-
-    pub(crate) fn subscribe(&self) -> broadcast::Receiver<Arc<Event>> {
-        self.events.subscribe()
-    }
 }
 
-/// A round as its readers are told of it: once for each rate that was due. What came along goes with the first.
+/// A round as its readers are told of it: once for each rate that was due. What came along goes with the first. What
+/// was read where nothing was due was asked for by somebody who looks at it.
 fn by_rate(rates: Rates, ts: Time, changes: Changes, profile: &Profile) -> Vec<(Rate, Time, Changes)> {
     let mut rounds: Vec<_> = rates.iter().map(|rate| (rate, ts, Changes::default())).collect();
+    if rounds.is_empty() {
+        rounds.push((Rate::OnDemand, ts, Changes::default()));
+    }
     for index in changes.values {
         let own = rounds.iter().position(|(rate, ..)| *rate == profile.points[index].rate);
         if let Some((.., of_rate)) = rounds.get_mut(own.unwrap_or(0)) {
@@ -327,7 +312,7 @@ fn bad_request(detail: String) -> Problem {
 }
 
 /// Stable: devices stay in the order of the site file among equals.
-fn gravest_first(alarms: &mut [AlarmView]) {
+pub(crate) fn gravest_first(alarms: &mut [AlarmView]) {
     alarms.sort_by_key(|alarm| (alarm.class, alarm.since));
 }
 
@@ -366,33 +351,5 @@ mod tests {
         let expected = [("gen2", "shutdowns"), ("gen1", "warnings"), ("gen2", "warnings")];
         let expected = expected.map(|(device, point)| (device.to_owned(), point.to_owned()));
         assert_eq!(listed(&hub.alarms()), expected);
-        assert_eq!(listed(&hub.snapshot(None).0.alarms), expected);
-        assert_eq!(listed(&hub.snapshot(Some(slots[0].key)).0.alarms), expected[1..2]);
-    }
-
-    #[tokio::test]
-    async fn a_round_of_two_rates_is_told_once_for_each() {
-        let hub = hub(&["gen1"], stop::channel().1);
-        let slots = &hub.table().devices;
-        let mut events = hub.subscribe();
-        let registers = [0, 1, 0, 0, 2302, 0, 215, 0, 1234, 0, 0, 0];
-        let both = Rates::from_iter([Rate::Fast, Rate::Slow]);
-        // Of the curve a part came along, which is none; the identity is whole.
-        hub.finish(&slots[0], answered(both, &[(100, &registers), (126, &[9, 0, 0, 0, 2])]));
-        let event = events.recv().await.unwrap();
-        let Event::Device { frames, .. } = &*event else { panic!("of a device: {event:?}") };
-        let told: Vec<serde_json::Value> = std::str::from_utf8(frames)
-            .unwrap()
-            .lines()
-            .filter_map(|line| serde_json::from_str(line.strip_prefix("data: ")?).ok())
-            .collect();
-        let changed = |told: &serde_json::Value| {
-            told["changed"].as_array().unwrap().iter().map(|v| v["id"].to_string()).collect::<Vec<_>>()
-        };
-        assert_eq!((&told[0]["rate"], &told[1]["rate"]), (&"fast".into(), &"slow".into()));
-        assert_eq!(told[0]["ts"], told[1]["ts"]);
-        assert_eq!(changed(&told[1]), ["\"hours\"", "\"starts\""]);
-        assert_eq!(changed(&told[0]).len(), 8, "seven fast points and what came along: {}", told[0]);
-        assert_eq!(told.len(), 3, "and the device once: {told:?}");
     }
 }

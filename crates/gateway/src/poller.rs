@@ -39,6 +39,10 @@ pub(crate) struct Poller {
     schedule: Schedule,
     /// Who answers, where that was asked and not told yet.
     known: Option<Known>,
+    /// The other device that answers in its place.
+    other: Option<Known>,
+    /// Whether it answered all that it was asked in a round since a refusal made it doubtful.
+    proven: bool,
     looks: watch::Receiver<Vec<usize>>,
     demand: Demand,
     /// Whether a read on demand may go before the next round, however late that is.
@@ -71,6 +75,8 @@ impl Poller {
             plan: PollPlan::new(site.profile, cost),
             schedule: Schedule::new(site.poll, hub.now()),
             known: None,
+            other: None,
+            proven: false,
             looks: slot.looks.watch(),
             demand: Demand::new(site.profile),
             owed: false,
@@ -116,13 +122,16 @@ impl Poller {
                 () = tokio::time::sleep(wait) => {}
                 Ok(()) = self.wire.changed(), if self.wire_failed || !self.schedule.is_silent() => {
                     self.wire.mark_unchanged();
+                    self.other = None;
                     match self.is_connected() {
                         true if self.schedule.is_silent() => self.schedule.probe(self.hub.now()),
                         true => self.schedule.reconnected(self.hub.now()),
                         false => {}
                     }
                 }
-                Ok(()) = self.looks.changed(), if is_polled => self.demand.begin(&self.looks.borrow_and_update()),
+                Ok(()) = self.looks.changed(), if is_polled => {
+                    self.demand.look(&self.looks.borrow_and_update());
+                }
             }
         }
     }
@@ -161,11 +170,13 @@ impl Poller {
             Some(failure) => self.fell_silent(&failure.clone(), round.held()),
             None => {
                 self.schedule.done(rates, now);
+                self.proven |= round.failures.is_empty();
                 if rates.contains(Rate::Once) && self.missed(Rate::Once, &round) {
                     self.schedule.missed_once();
                 }
                 if rates.contains(Rate::Fast) {
-                    self.demand.begin(&self.looks.borrow_and_update());
+                    self.demand.look(&self.looks.borrow_and_update());
+                    self.demand.begin();
                     self.owed = true;
                 }
             }
@@ -194,6 +205,7 @@ impl Poller {
             None => self.schedule.silent(now),
         }
         self.wire_failed = !failure.is_silence();
+        self.other = None;
         self.demand.clear();
     }
 
@@ -203,7 +215,7 @@ impl Poller {
 
     /// One read of what somebody looks at.
     async fn read_on_demand(&mut self) {
-        self.demand.keep(&self.looks.borrow_and_update());
+        self.demand.look(&self.looks.borrow_and_update());
         let Some((read, mut round)) = self.demand.next(&self.plan, self.hub.now()) else { return };
         let failure = self.read(Rate::OnDemand.into(), read, &mut round).await;
         if self.wire.has_changed().unwrap_or(false) || round.is_cut {
@@ -216,9 +228,10 @@ impl Poller {
         }
     }
 
-    /// Whether who answers may be asked once more. It is not when that is known of this very round.
+    /// Whether who answers may be asked once more because a read was refused. It is not when that is known of this very
+    /// round.
     fn may_doubt(&self, now: Duration) -> bool {
-        self.known.is_none() && self.schedule.may_doubt(now)
+        self.known.is_none() && (self.proven || self.schedule.may_doubt(now))
     }
 
     /// Whether points of a rate did not come for a reason that may pass.
@@ -293,6 +306,7 @@ impl Poller {
             let now = self.hub.now();
             if failure.is_refusal() && !self.plan.is_refused(read) && self.may_doubt(now) {
                 self.schedule.doubt(now);
+                self.proven = false;
                 round.is_cut = true;
                 return None;
             }
@@ -312,3 +326,6 @@ impl Poller {
         None
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -101,6 +101,13 @@ impl Table {
         tally
     }
 
+    /// Whether it is the same devices and wires that make up another table.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let devices = |table: &Self| table.devices.iter().map(|slot| slot.key).collect::<Vec<_>>();
+        let wires = |table: &Self| table.wires.iter().map(|wire| wire.0.clone()).collect::<Vec<_>>();
+        devices(self) == devices(other) && wires(self) == wires(other)
+    }
+
     /// A device by its id.
     pub(crate) fn device(&self, id: &str) -> Result<&Arc<Slot>, Problem> {
         self.devices.iter().find(|slot| slot.id == id).ok_or_else(|| {

@@ -10,7 +10,7 @@ use std::sync::{Arc, LazyLock};
 
 use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::extract::{Path, Query, State};
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Json, Router};
 use serde::Deserialize;
@@ -21,8 +21,8 @@ use utoipa_axum::routes;
 pub(crate) use self::etag::tagged;
 pub use self::problem::Problem;
 use self::types::{
-    AlarmView, AlarmsEvent, DeviceView, JoinedView, PointsView, SiteView, SnapshotEvent, ValueView,
-    ValuesEvent, WireDetailView, WireView,
+    AlarmView, AlarmsEvent, DeviceView, JoinedView, PointsView, ResumedEvent, SiteInfo, SiteView,
+    SnapshotEvent, StateEvent, ValueView, ValuesEvent, WireDetailView, WireView,
 };
 use crate::events;
 use crate::hub::Hub;
@@ -71,7 +71,7 @@ fn routes() -> OpenApiRouter<Arc<Hub>> {
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
     ),
     // The events are not a body that the document could describe, so their shapes are named here.
-    components(schemas(SnapshotEvent, ValuesEvent, AlarmsEvent, Problem)),
+    components(schemas(SnapshotEvent, StateEvent, ResumedEvent, SiteInfo, ValuesEvent, AlarmsEvent, Problem)),
     tags((name = "site", description = "The site, its devices and its wires"), (name = "live", description = "What they read now"), (name = "operation", description = "For whoever keeps the gateway running")),
 )]
 struct Document;
@@ -217,37 +217,55 @@ async fn wire(
     hub.wire(&named(wire, "wire")?).map(Json)
 }
 
-/// Whose events are wanted.
+/// Which events are wanted, and from where on.
 #[derive(Debug, Default, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct EventsQuery {
-    /// Only this device.
-    #[param(example = "gen1")]
-    device: Option<String>,
+    /// Only these devices: ids with commas between them.
+    #[param(example = "gen1,gen2")]
+    pub(crate) device: Option<String>,
+    /// Of the values only those of these groups: ids with commas between them. What is read on demand is read while a
+    /// stream that names its group is open.
+    #[param(example = "genset,display")]
+    pub(crate) group: Option<String>,
+    /// Of the values only what carries one of these signals: ids of the shared vocabulary with commas between them.
+    /// Those that a device does not have are passed over. With groups: what is in either.
+    #[param(example = "genset.power.active,breaker.genset.closed")]
+    pub(crate) signal: Option<String>,
+    /// Id of the last event that a reader has of this query: what it missed follows, if that is still known. The
+    /// header `Last-Event-ID` counts before it.
+    pub(crate) last_event_id: Option<String>,
 }
 
 /// What happens, as it happens: server-sent events.
 ///
-/// First `snapshot` (`SnapshotEvent`); then `values` (`ValuesEvent`) once a finished poll round of a device,
-/// `device` (`DeviceView`) when a device changed and `alarms` (`AlarmsEvent`) when its active alarms did. A comment
-/// keeps the connection alive each 15 seconds. A reader that falls behind gets a new `snapshot` in place of
-/// the events it missed.
+/// First `snapshot` (`SnapshotEvent`), then one `state` (`StateEvent`) for each of its devices; from then on `values`
+/// (`ValuesEvent`) once a poll round of a device is finished, `device` (`DeviceView`) when a device changed, `alarms`
+/// (`AlarmsEvent`) when its active alarms did, and `site` (`SiteInfo`) when a site file was accepted or refused. Other
+/// devices or wires begin with `snapshot` again. A round that brought nothing that is asked for is told of with
+/// nothing in it as long as something that is asked for is read at its rate.
+///
+/// The last event of a snapshot and all later ones have an id. A reader that comes back with one gets `resumed`
+/// (`ResumedEvent`) and what it missed, or a `snapshot` where that is not known any more. A reader that falls behind
+/// gets `device`, `alarms` and `state` of each device in place of the events it missed. A comment keeps the connection
+/// alive each 15 seconds. The stream is compressed with gzip for those who accept it.
 #[utoipa::path(
-    get, path = "/api/v1/events", operation_id = "events", tag = "live", params(EventsQuery),
+    get, path = "/api/v1/events", operation_id = "events", tag = "live",
+    params(EventsQuery, ("last-event-id" = Option<String>, Header, description = "Id of the last event that the reader has")),
     responses(
         (status = OK, body = String, content_type = "text/event-stream", description = "The stream"),
-        (status = BAD_REQUEST, body = Problem, content_type = "application/problem+json", description = "The query is not understood"),
+        (status = BAD_REQUEST, body = Problem, content_type = "application/problem+json", description = "The query is not understood, or names a group that there is not"),
         (status = NOT_FOUND, body = Problem, content_type = "application/problem+json", description = "There is no such device"),
     ),
 )]
 async fn stream(
     State(hub): State<Arc<Hub>>,
     query: Result<Query<EventsQuery>, QueryRejection>,
+    headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let Query(query) = query.map_err(bad_query)?;
-    let only = query.device.map(|device| hub.device(&device)).transpose()?.map(|slot| slot.key);
-    Ok(events::response(hub, only))
+    events::response(hub, &query, &headers)
 }
 
 /// This document.

@@ -4,6 +4,7 @@
 //! forgotten. `openapi.json` is generated from them, and the page's own types from that file.
 
 mod diagram;
+mod event;
 mod wire;
 
 use std::borrow::Cow;
@@ -15,6 +16,7 @@ use utoipa::openapi::{RefOr, schema};
 use utoipa::{PartialSchema, ToSchema};
 
 pub use self::diagram::{ConnectionView, DiagramView, NodeView};
+pub use self::event::{AlarmsEvent, ResumedEvent, SnapshotEvent, StateEvent, ValuesEvent};
 pub use self::wire::{
     ExceptionCount, LatencyBucket, LatencyView, PlanView, PlannedRead, PlannedRound, UnitState, UnitView,
     WireDetailView, WireState, WireStatistics, WireTime, WireView,
@@ -542,56 +544,6 @@ pub struct AlarmView {
     pub class: Class,
     /// When the gateway first saw it set.
     pub since: Time,
-}
-
-/// `event: snapshot`: everything, sent first and again after a reader fell behind.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct SnapshotEvent {
-    /// The site.
-    pub site: SiteInfo,
-    /// The devices asked for, in the order of the site file.
-    pub devices: Vec<DeviceSnapshot>,
-    /// Their active alarms, the gravest first.
-    pub alarms: Vec<AlarmView>,
-}
-
-/// One device in a snapshot.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct DeviceSnapshot {
-    /// The device.
-    pub device: DeviceView,
-    /// Its values, in address order.
-    pub values: Vec<ValueView>,
-    /// What several of its points make up.
-    pub joined: Vec<JoinedView>,
-}
-
-/// `event: values`: a poll round of one device is finished.
-///
-/// Every point of that device and rate whose quality is `good` was read at `ts`, changed or not.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct ValuesEvent {
-    /// Id of the device.
-    #[schema(examples("gen1"))]
-    pub device: String,
-    /// Which of its points were read.
-    pub rate: Rate,
-    /// When the round was finished.
-    pub ts: Time,
-    /// The points whose value or quality changed.
-    pub changed: Vec<ValueView>,
-    /// The joined signals whose value or quality changed.
-    pub joined: Vec<JoinedView>,
-}
-
-/// `event: alarms`: the active alarms of one device changed.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct AlarmsEvent {
-    /// Id of the device.
-    #[schema(examples("gen1"))]
-    pub device: String,
-    /// Its whole list, the gravest first.
-    pub alarms: Vec<AlarmView>,
 }
 
 /// A value as JSON has it: a number, a label, an array of labels or codes, or null.

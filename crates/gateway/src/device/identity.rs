@@ -74,6 +74,7 @@ pub(crate) struct Check {
     waiting: VecDeque<Read>,
     /// Why one of the first reads did not come.
     doubt: Option<(Read, Failure)>,
+    before: Option<Known>,
     finding: Option<Finding>,
 }
 
@@ -91,7 +92,8 @@ enum Asking {
 }
 
 impl Check {
-    pub(crate) fn new(site: &SiteDevice, expected: &Expected) -> Self {
+    /// `before` is the other device that was found in its place, so that the other profiles are not asked for again.
+    pub(crate) fn new(site: &SiteDevice, expected: &Expected, before: Option<Known>) -> Self {
         let signature = signature(site.profile, builtins());
         let nothing = || Known {
             verdict: Identity::Plausible,
@@ -105,6 +107,7 @@ impl Check {
             waiting: signature.first.iter().copied().collect(),
             asking: Asking::First,
             doubt: None,
+            before,
             finding: signature.first.is_empty().then(|| Finding::Known(nothing())),
             signature,
         }
@@ -192,6 +195,10 @@ impl Check {
         let Some((read, first)) = self.doubt.take() else { return };
         let is_refusal = first.is_refusal() && second.as_ref().is_none_or(Failure::is_refusal);
         if is_refusal {
+            if let Some(before) = self.before.take() {
+                self.finding = Some(Finding::Known(before));
+                return;
+            }
             let left = builtins().iter().filter(|other| other.key != self.profile.key).collect();
             self.asking = Asking::Others { left, now: None, fit: Vec::new(), refused: (read, first) };
             self.next_other();

@@ -48,7 +48,7 @@ fn before_the_first_round_nothing_is_claimed() {
         (voltage.value, voltage.quality, voltage.ts, voltage.raw),
         (PointValue::None, Shown::Stale, None, None)
     );
-    assert!(!device.values().iter().any(|value| value.id == "picture"), "read on demand only");
+    assert!(!device.shows(device.site().profile.point_index("picture").unwrap()), "read on demand only");
 }
 
 #[test]

@@ -15,6 +15,8 @@ use crate::poll_plan::PollPlan;
 pub(super) struct Demand {
     /// Groups in which something is read on demand.
     groups: Vec<usize>,
+    /// Groups that somebody looks at.
+    looked: Vec<usize>,
     /// Those that are still to be read this time.
     waiting: VecDeque<usize>,
     pass: Option<Pass>,
@@ -34,7 +36,7 @@ impl Demand {
         let points = || profile.points.iter().filter(|point| point.access.is_readable());
         let on_demand = |group: &usize| points().any(|p| p.group == *group && p.rate == Rate::OnDemand);
         let groups = (0..profile.groups.len()).filter(on_demand).collect();
-        Self { groups, waiting: VecDeque::new(), pass: None }
+        Self { groups, looked: Vec::new(), waiting: VecDeque::new(), pass: None }
     }
 
     /// Whether there is anything to read.
@@ -42,17 +44,22 @@ impl Demand {
         self.pass.is_some() || !self.waiting.is_empty()
     }
 
-    /// Reads every group that is looked at once more, unless the last time is not over.
-    pub(super) fn begin(&mut self, looked: &[usize]) {
-        if !self.is_waiting() {
-            self.waiting = self.groups.iter().copied().filter(|group| looked.contains(group)).collect();
-        }
-    }
-
-    /// Stops what nobody looks at any more.
-    pub(super) fn keep(&mut self, looked: &[usize]) {
+    /// Takes over which groups somebody looks at: a new one is read soon, and what nobody looks at any more is not.
+    pub(super) fn look(&mut self, looked: &[usize]) {
         self.waiting.retain(|group| looked.contains(group));
         self.pass.take_if(|pass| !looked.contains(&pass.group));
+        let new = self.groups.iter().filter(|group| looked.contains(group) && !self.looked.contains(group));
+        self.waiting.extend(new);
+        self.looked.clear();
+        self.looked.extend_from_slice(looked);
+    }
+
+    /// Reads every group that is looked at once more, unless the last time is not over.
+    pub(super) fn begin(&mut self) {
+        if !self.is_waiting() {
+            let looked = self.groups.iter().copied().filter(|group| self.looked.contains(group));
+            self.waiting = looked.collect();
+        }
     }
 
     /// Gives up what is under way.
@@ -120,7 +127,7 @@ mod tests {
     #[test]
     fn what_can_only_be_written_is_never_read() {
         let (profile, plan, mut demand) = datakom();
-        demand.begin(&[group(profile, "control"), group(profile, "identity")]);
+        demand.look(&[group(profile, "control"), group(profile, "identity")]);
         assert!(!demand.is_waiting() && demand.next(&plan, at(0)).is_none());
     }
 
@@ -128,10 +135,11 @@ mod tests {
     fn a_picture_is_one_round_of_all_its_reads() {
         let (profile, plan, mut demand) = datakom();
         let lcd = group(profile, LCD);
-        demand.begin(&[lcd, lcd]);
+        demand.look(&[lcd, lcd]);
         for number in 1..=32 {
             // Looking anew begins nothing anew.
-            demand.begin(&[lcd]);
+            demand.look(&[lcd]);
+            demand.begin();
             let (read, mut round) = demand.next(&plan, at(number)).unwrap();
             round.answers.push((read.address, vec![0; read.count.into()]));
             let done = demand.took(read, round, None, at(number));
@@ -141,15 +149,17 @@ mod tests {
             );
         }
         assert!(!demand.is_waiting());
+        demand.begin();
+        assert!(demand.is_waiting(), "and once more with the next fast round");
     }
 
     #[test]
     fn it_stops_when_nobody_looks() {
         let (profile, plan, mut demand) = datakom();
         let lcd = group(profile, LCD);
-        demand.begin(&[lcd]);
+        demand.look(&[lcd]);
         demand.next(&plan, at(0)).unwrap();
-        demand.keep(&[]);
+        demand.look(&[]);
         assert!(!demand.is_waiting());
         assert!(
             demand.took(Read { function: 3, address: 0, count: 1 }, Round::default(), None, at(0)).is_none()
@@ -159,7 +169,7 @@ mod tests {
     #[test]
     fn a_pass_ends_where_the_device_is_silent() {
         let (profile, plan, mut demand) = datakom();
-        demand.begin(&[group(profile, LCD)]);
+        demand.look(&[group(profile, LCD)]);
         let (read, round) = demand.next(&plan, at(0)).unwrap();
         let round = demand.took(read, round, Some(timeout()), at(1)).unwrap();
         assert_eq!((round.failures.len(), round.answers.len(), demand.is_waiting()), (32, 0, false));

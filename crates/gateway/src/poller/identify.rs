@@ -30,11 +30,14 @@ impl Poller {
                 let rates = if news { POLLED.into_iter().collect() } else { Rate::Fast.into() };
                 self.schedule.wrong(now);
                 self.demand.clear();
+                // Who says another model than is wanted is no other family.
+                self.other = Some(known.clone()).filter(|known| known.model.is_none());
                 self.finish(Round { rates, identity: Some(known), ..Round::default() });
                 None
             }
             Finding::Known(known) => {
                 self.schedule.identified(now);
+                self.other = None;
                 Some(known)
             }
             Finding::Unclear(failure) => {
@@ -56,7 +59,7 @@ impl Poller {
     async fn ask(&self) -> (Option<Finding>, Option<Duration>) {
         let mut check = {
             let live = self.slot.lock();
-            Check::new(&self.site, live.device.expected())
+            Check::new(&self.site, live.device.expected(), self.other.clone())
         };
         let mut held = None;
         while let Some(Question { read, of }) = check.next() {

@@ -22,10 +22,11 @@ async fn a_snapshot_comes_first() {
     assert_eq!(first.name, "snapshot");
     assert_eq!(first.data["site"]["name"], "Bench");
     assert_eq!(first.data["alarms"], json!([]));
-    let device = &first.data["devices"][0];
-    assert_eq!(device["device"]["id"], "gen1");
+    assert_eq!(first.data["devices"][0]["id"], "gen1");
+    let state = stream.next().await.unwrap();
+    assert_eq!((state.name.as_str(), &state.data["device"]), ("state", &json!("gen1")));
     let voltage =
-        device["values"].as_array().unwrap().iter().find(|value| value["id"] == "genset_l1_voltage");
+        state.data["values"].as_array().unwrap().iter().find(|value| value["id"] == "genset_l1_voltage");
     assert_eq!(voltage.unwrap()["value"], json!(230.2));
 }
 

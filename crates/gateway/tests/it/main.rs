@@ -11,6 +11,7 @@ mod http;
 mod identity;
 mod live;
 mod openapi;
+mod reload;
 mod sharing;
 mod start;
 mod support;

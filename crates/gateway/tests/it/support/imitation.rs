@@ -66,9 +66,16 @@ impl Imitation {
 
     /// On a port that something else must know beforehand.
     pub(crate) async fn at(address: SocketAddr) -> Self {
+        Self::with(address, |_| {}).await
+    }
+
+    /// The same, prepared before it is first asked.
+    pub(crate) async fn with(address: SocketAddr, prepare: impl FnOnce(&mut Behaviour)) -> Self {
         let listener = TcpListener::bind(address).await.unwrap();
         let address = listener.local_addr().unwrap();
-        let behaviour = Arc::new(Mutex::new(Behaviour::default()));
+        let mut behaviour = Behaviour::default();
+        prepare(&mut behaviour);
+        let behaviour = Arc::new(Mutex::new(behaviour));
         let task = tokio::spawn(serve(listener, Arc::clone(&behaviour)));
         Self { address, behaviour, task: Some(task) }
     }
