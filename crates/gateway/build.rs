@@ -19,6 +19,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let built = dist.join("index.html").is_file();
     let folder = if built { fs::canonicalize(&dist)? } else { plain };
+    // The document is written anew for each reader.
+    fs::copy(folder.join("index.html"), out_dir.join("index.html"))?;
     let assets = memory_serve::assets_to_code(&folder.to_string_lossy(), &folder, &out_dir, true, silent);
     fs::write(Path::new(&out_dir).join("memory_serve_assets.rs"), format!("&[(\"default\", {assets})]"))?;
     Ok(())

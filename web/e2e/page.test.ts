@@ -267,25 +267,6 @@ test('the page holds under a strict content security policy', async () => {
   await page.close()
 })
 
-test('works below a path prefix, as behind a reverse proxy', async () => {
-  const page = await browser.newPage({ viewport: DESK })
-  page.on('pageerror', (error) => complaints.push(`error: ${error.message}`))
-  const prefix = new URL('site/north/', demo.address).href
-  await page.route(`${demo.address}**`, async (route) => {
-    const url = route.request().url()
-    if (!url.startsWith(prefix)) return route.fulfill({ status: 404 })
-    // A stream cannot be replayed through the test: that it asks for the right one is what counts here.
-    if (url.includes('/events')) return route.abort()
-    return route.fulfill({ response: await route.fetch({ url: url.replace(prefix, demo.address) }) })
-  })
-  const asked = page.waitForRequest(`${prefix}api/v1/events*`)
-  await page.goto(prefix)
-  await asked
-  await page.getByRole('alert').getByText('No connection to the gateway.').waitFor()
-  expect(complaints).toEqual([])
-  await page.close()
-})
-
 test('a gateway that goes away is told within seconds, and it comes back by itself', async () => {
   const own = await Demo.start()
   const page = await browser.newPage({ viewport: DESK })

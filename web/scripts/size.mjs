@@ -4,6 +4,8 @@ import { dirname, join, relative } from 'node:path'
 import { brotliCompressSync } from 'node:zlib'
 
 const BUDGET = 45_000
+// What the gateway writes into the document for a site of four controllers; e2e/slow.test.ts weighs the real one.
+const SITE = 3_000
 const DIST = new URL('../dist/', import.meta.url).pathname
 
 /** The page, what it names, and what that imports at once; what is imported later is not the first view. */
@@ -20,12 +22,13 @@ function firstView(file, found = new Set()) {
   return found
 }
 
-let total = 0
+let total = SITE
 for (const file of firstView(join(DIST, 'index.html'))) {
   const size = brotliCompressSync(readFileSync(file)).length
   total += size
   console.log(`${(size / 1000).toFixed(1).padStart(6)} KB  ${relative(DIST, file)}`)
 }
+console.log(`${(SITE / 1000).toFixed(1).padStart(6)} KB  the site in the document`)
 console.log(`${(total / 1000).toFixed(1).padStart(6)} KB  first view, brotli; budget ${BUDGET / 1000} KB`)
 if (total > BUDGET) {
   console.error(

@@ -394,26 +394,26 @@ export interface components {
             loaded: components["schemas"]["Time"];
             refused: components["schemas"]["RefusedView"] | null;
         };
-        /** @description A line between two nodes, with a breaker in it or without. */
+        /** @description A line between two nodes. */
         ConnectionView: {
             /**
-             * @description The signal that says whether the breaker is closed; null for a plain line.
+             * @description The signal by which it does; null for a line without a breaker.
              * @example breaker.mains.closed
              */
             breaker: string | null;
             /**
-             * @description Id of the device that knows the breaker; null for a plain line.
+             * @description Id of the device that tells the position of its breaker; null where none does.
              * @example gen1
              */
             device: string | null;
             /**
-             * @description Id of the node nearer to the source.
+             * @description Id of the node at one end, the one nearer to the source.
              * @example utility
              */
             from: string;
             /**
-             * @description Id of the other node.
-             * @example bus
+             * @description Id of the node at the other end.
+             * @example bus1
              */
             to: string;
         };
@@ -492,11 +492,11 @@ export interface components {
              */
             wire: string;
         };
-        /** @description How the site is connected: what there is, and what joins it. */
+        /** @description How the site is connected; empty where its file draws nothing. */
         DiagramView: {
-            /** @description What joins them, in the order of the site file. */
+            /** @description Lines between nodes, in the order of the site file. */
             connections: components["schemas"]["ConnectionView"][];
-            /** @description Sources, buses and loads, in the order of the site file. */
+            /** @description What is connected, in the order of the site file. */
             nodes: components["schemas"]["NodeView"][];
         };
         /** @description How often a device answered with one exception code. */
@@ -673,30 +673,32 @@ export interface components {
              */
             tank_l: number | null;
         };
-        /** @description A source, a bus or a load. */
+        /**
+         * @description What a node is.
+         * @enum {string}
+         */
+        NodeKind: "mains" | "genset" | "bus" | "load" | "compressor";
+        /** @description One thing that is connected to others. */
         NodeView: {
             /**
-             * @description Id of the device whose signals describe it; null when none does.
+             * @description Id of the device that measures it; null where none does.
              * @example gen1
              */
             device: string | null;
             /**
-             * @description Its id.
-             * @example utility
+             * @description Its id in the site file.
+             * @example bus1
              */
             id: string;
+            /** @description What it is. */
+            kind: components["schemas"]["NodeKind"];
             /**
-             * @description What it is: `mains`, `genset`, `bus`, `load` or `compressor`.
-             * @example mains
-             */
-            kind: string;
-            /**
-             * @description Its name.
-             * @example Utility feed
+             * @description Its name in the site file.
+             * @example Emergency bus
              */
             name: string;
             /**
-             * @description Which object of that device's signals it is; null when no device describes it.
+             * @description Which object of that device's signals describes it; null where none does.
              * @example mains
              */
             signals: string | null;

@@ -2,6 +2,9 @@
 
 use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
 
+/// Mistakes that are shown; who has mended these will see the others.
+const MOST_SHOWN: usize = 50;
+
 /// One mistake in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Excerpt {
@@ -36,7 +39,7 @@ impl Excerpts {
         let theme = if coloured { GraphicalTheme::unicode() } else { GraphicalTheme::none() };
         let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false).with_context_lines(1);
         let mut text = String::new();
-        for excerpt in &self.excerpts {
+        for excerpt in self.excerpts.iter().take(MOST_SHOWN) {
             if !text.is_empty() {
                 text.push('\n');
             }
@@ -45,6 +48,9 @@ impl Excerpts {
             if handler.render_report(&mut text, &shown).is_err() {
                 text.push_str(&format!("{}; {}\n", excerpt.sentence, excerpt.help));
             }
+        }
+        if let Some(more) = self.excerpts.len().checked_sub(MOST_SHOWN).filter(|more| *more > 0) {
+            text.push_str(&format!("\nand {more} more\n"));
         }
         text
     }
@@ -94,5 +100,21 @@ mod tests {
             length: 6,
         };
         insta::assert_snapshot!(Excerpts::new("site.toml", text, vec![excerpt]).render(false));
+    }
+
+    #[test]
+    fn shows_no_more_than_somebody_reads() {
+        let excerpt = Excerpt {
+            sentence: "site.toml:1:1: wrong".to_owned(),
+            help: "mend it".to_owned(),
+            offset: 0,
+            length: 1,
+        };
+        let render =
+            |count| Excerpts::new("site.toml", "x\n".to_owned(), vec![excerpt.clone(); count]).render(false);
+        assert!(!render(50).contains("more"));
+        let text = render(9_000);
+        assert_eq!(text.matches("wrong").count(), 50);
+        assert!(text.ends_with("\nand 8950 more\n"), "{text}");
     }
 }

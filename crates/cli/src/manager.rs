@@ -1,17 +1,24 @@
 //! The service manager that started us, where it is systemd or speaks like it: told when the gateway is ready, how its
 //! devices fare, and that it lives.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use busbar_gateway::Tally;
 
+/// The gateway's heart beats each second; a machine that is busy for longer than this is as bad as a gateway that hangs.
+const PATIENCE: Duration = Duration::from_secs(5);
+
 /// Who is told; nobody where nobody listens.
-#[derive(Default)]
 pub(crate) struct Manager {
     told: String,
+    pulse: Pulse,
 }
 
 impl Manager {
+    pub(crate) fn new() -> Self {
+        Self { told: String::new(), pulse: Pulse { beats: 0, felt: Instant::now() } }
+    }
+
     /// The gateway listens, or goes on with another site file or with the one before.
     pub(crate) fn ready(&self) {
         wire::send(wire::Message::Ready);
@@ -42,12 +49,13 @@ impl Manager {
         wire::watchdog().map(|patience| (patience / 2).max(Duration::from_millis(1)))
     }
 
-    /// Gives a sign of life, unless the gateway hangs.
-    pub(crate) fn lives(&self, hangs: bool) {
-        if hangs {
-            tracing::error!("the gateway hangs, so the service manager is not told that it lives");
-        } else {
-            wire::send(wire::Message::Alive);
+    /// Gives a sign of life, if there was one: when the gateway last had a heartbeat.
+    pub(crate) fn lives(&mut self, heartbeat: u64) {
+        match self.pulse.is_felt(heartbeat, Instant::now()) {
+            true => wire::send(wire::Message::Alive),
+            false => tracing::error!(
+                "the gateway hangs: its values no longer age, and the service manager is not told that it lives"
+            ),
         }
     }
 }
@@ -59,6 +67,22 @@ fn status(Tally { devices, answering, faults, .. }: Tally) -> String {
         faults => format!("{faults} faults"),
     };
     format!("{answering} of {devices} devices answer, {faults}")
+}
+
+/// A count that goes up while the gateway lives.
+struct Pulse {
+    beats: u64,
+    /// When it last went up.
+    felt: Instant,
+}
+
+impl Pulse {
+    fn is_felt(&mut self, beats: u64, now: Instant) -> bool {
+        if beats != self.beats {
+            (self.beats, self.felt) = (beats, now);
+        }
+        now.saturating_duration_since(self.felt) <= PATIENCE
+    }
 }
 
 #[cfg(unix)]
@@ -124,12 +148,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn how_the_devices_fare_is_one_line() {
-        let mut tally = Tally::default();
-        assert_eq!(status(tally), "0 of 0 devices answer, no fault");
-        (tally.devices, tally.answering, tally.faults) = (4, 3, 1);
-        assert_eq!(status(tally), "3 of 4 devices answer, 1 fault");
-        tally.faults = 2;
-        assert_eq!(status(tally), "3 of 4 devices answer, 2 faults");
+    fn a_gateway_that_hangs_gives_no_sign_of_life() {
+        let start = Instant::now();
+        let after = |seconds| start + Duration::from_secs(seconds);
+        let mut pulse = Pulse { beats: 0, felt: start };
+        for (beats, second, lives) in [
+            (0, 0, true),
+            (0, 5, true),
+            (0, 6, false),
+            (1, 7, true),
+            (1, 12, true),
+            (1, 13, false),
+            (9, 14, true),
+        ] {
+            assert_eq!(pulse.is_felt(beats, after(second)), lives, "{beats} beats after {second} s");
+        }
     }
 }

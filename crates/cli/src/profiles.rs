@@ -1,6 +1,11 @@
 //! Which profile a KEY means: one that is compiled in, or a file.
 
-use std::{fs, ops::Deref, path::Path};
+use std::{
+    fs::File,
+    io::{self, ErrorKind, Read},
+    ops::Deref,
+    path::Path,
+};
 
 use busbar_profile::{Command, Findings, Point, Profile, builtin, builtins};
 
@@ -11,6 +16,9 @@ use crate::{
 
 /// More commands than this are not listed in a sentence.
 const MOST_LISTED: usize = 24;
+
+/// More bytes than this are no profile or site file.
+const LARGEST: u64 = 16 << 20;
 
 /// A profile, wherever it came from.
 #[derive(Debug)]
@@ -135,11 +143,17 @@ pub(crate) fn load(path: &Path) -> Result<Profile, Failure> {
 /// The text of a file that the caller named.
 pub(crate) fn read(path: &Path, what: &str) -> Result<String, Failure> {
     let file = path.display();
-    let bytes = fs::read(path).map_err(|error| {
-        Failure::Failed(format!(
-            "{what} {file} cannot be read: {error}; check the path and that you may read it"
-        ))
-    })?;
+    let mut bytes = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(LARGEST + 1).read_to_end(&mut bytes));
+    if let Err(error) = read {
+        return Err(Failure::Failed(format!("{what} {file} cannot be read: {}", reason(&error))));
+    }
+    if bytes.len() as u64 > LARGEST {
+        return Err(Failure::Failed(format!(
+            "{what} {file} is larger than {} MiB, which none needs; check that it is the right file",
+            LARGEST >> 20
+        )));
+    }
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let line = 1 + error.as_bytes().iter().take(valid).filter(|byte| **byte == b'\n').count();
@@ -147,6 +161,18 @@ pub(crate) fn read(path: &Path, what: &str) -> Result<String, Failure> {
             "{what} {file} is not UTF-8 text: line {line} has other bytes; save it as UTF-8"
         ))
     })
+}
+
+/// Why a file cannot be read, and what to do.
+fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::NotFound => "there is no such file; check the path".to_owned(),
+        ErrorKind::PermissionDenied => {
+            "this user may not read it; give the right, or start as another user".to_owned()
+        }
+        ErrorKind::IsADirectory => "it is a folder; name the file in it".to_owned(),
+        _ => format!("{error}; check the path"),
+    }
 }
 
 pub(crate) fn excerpts(file: &str, text: String, findings: &Findings) -> Excerpts {
@@ -160,4 +186,24 @@ pub(crate) fn excerpts(file: &str, text: String, findings: &Findings) -> Excerpt
         })
         .collect();
     Excerpts::new(file, text, excerpts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_cannot_be_read_says_why() {
+        for (kind, expected) in [
+            (ErrorKind::NotFound, "there is no such file; check the path"),
+            (
+                ErrorKind::PermissionDenied,
+                "this user may not read it; give the right, or start as another user",
+            ),
+            (ErrorKind::IsADirectory, "it is a folder; name the file in it"),
+            (ErrorKind::TimedOut, "timed out; check the path"),
+        ] {
+            assert_eq!(reason(&kind.into()), expected);
+        }
+    }
 }

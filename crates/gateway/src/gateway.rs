@@ -109,9 +109,10 @@ impl Gateway {
         self.hub.table().tally()
     }
 
-    /// Whether it hangs: the age of its values, which is looked at each second with every device, was not for long.
-    pub fn hangs(&self) -> bool {
-        self.hub.health().hangs(self.hub.now()).is_some()
+    /// When the age of every value was last looked at, in milliseconds since the start: each second, and it stands
+    /// still when that, or any device, hangs.
+    pub fn heartbeat(&self) -> u64 {
+        self.hub.health().last_beat()
     }
 
     /// Goes on with another site file. A wire that it did not change stays open, a device that it did not change keeps

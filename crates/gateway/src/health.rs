@@ -3,6 +3,8 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
+use busbar_profile::Rate;
+
 use crate::table::{Slot, Table};
 
 /// Values are looked at for their age once a second; when that has not happened for so long, the gateway hangs.
@@ -23,9 +25,14 @@ impl Health {
         self.beat.store(u64::try_from(now.as_millis()).unwrap_or(u64::MAX), Ordering::Relaxed);
     }
 
+    /// When that was, in milliseconds since the start.
+    pub(crate) fn last_beat(&self) -> u64 {
+        self.beat.load(Ordering::Relaxed)
+    }
+
     /// For how long they have not been, when that is too long.
     pub(crate) fn hangs(&self, now: Duration) -> Option<Duration> {
-        let since = now.saturating_sub(Duration::from_millis(self.beat.load(Ordering::Relaxed)));
+        let since = now.saturating_sub(Duration::from_millis(self.last_beat()));
         (since > LATE).then_some(since)
     }
 
@@ -44,13 +51,12 @@ impl Health {
 /// A device has been tried when it has given its first values, or when it is known what keeps it from that.
 fn is_tried(slot: &Slot) -> bool {
     let live = slot.lock();
-    live.device.view().last_seen.is_some() || live.device.fault().is_some()
+    let rates = [Rate::Fast, Rate::Slow, Rate::Once];
+    live.device.fault().is_some() || rates.iter().any(|rate| live.device.last_round(*rate).is_some())
 }
 
 #[cfg(test)]
 mod tests {
-    use busbar_profile::Rate;
-
     use super::*;
     use crate::stop;
     use crate::testing::{answered, at, hub, silence};

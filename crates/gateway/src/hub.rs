@@ -281,13 +281,9 @@ impl Hub {
     }
 }
 
-/// A round as its readers are told of it: once for each rate that was due. What came along goes with the first. What
-/// was read where nothing was due was asked for by somebody who looks at it.
+/// A round as its readers are told of it: once for each rate that was due. What came along goes with the first.
 fn by_rate(rates: Rates, ts: Time, changes: Changes, profile: &Profile) -> Vec<(Rate, Time, Changes)> {
     let mut rounds: Vec<_> = rates.iter().map(|rate| (rate, ts, Changes::default())).collect();
-    if rounds.is_empty() {
-        rounds.push((Rate::OnDemand, ts, Changes::default()));
-    }
     for index in changes.values {
         let own = rounds.iter().position(|(rate, ..)| *rate == profile.points[index].rate);
         if let Some((.., of_rate)) = rounds.get_mut(own.unwrap_or(0)) {

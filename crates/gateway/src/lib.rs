@@ -36,5 +36,7 @@ mod wires;
 pub use crate::api::openapi;
 pub use crate::gateway::{Gateway, Options, StartError, start};
 pub use crate::server::Limits;
-pub use crate::site::{DEFAULT_LISTEN, Poll, Site, SiteDevice, SiteWire};
+pub use crate::site::{
+    Connection, DEFAULT_LISTEN, Diagram, Nameplate, Node, NodeKind, Poll, Site, SiteDevice, SiteWire,
+};
 pub use crate::table::Tally;

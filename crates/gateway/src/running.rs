@@ -85,11 +85,11 @@ impl Running {
     pub(crate) fn table(&self, site: &Site) -> Table {
         Table {
             name: site.name.clone(),
-            time_zone: None,
+            time_zone: site.time_zone.clone(),
             hosts: site.hosts.clone(),
             devices: self.devices.iter().map(|device| Arc::clone(&device.slot)).collect(),
             wires: self.wires.iter().map(|wire| (wire.site.id.clone(), wire.link.clone())).collect(),
-            diagram: DiagramView::default(),
+            diagram: DiagramView::from(&site.diagram),
         }
     }
 

@@ -90,6 +90,13 @@ impl Slot {
 }
 
 impl Table {
+    /// Whether it is the same devices and wires that make up another table.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let devices = |table: &Self| table.devices.iter().map(|slot| slot.key).collect::<Vec<_>>();
+        let wires = |table: &Self| table.wires.iter().map(|wire| wire.0.clone()).collect::<Vec<_>>();
+        devices(self) == devices(other) && wires(self) == wires(other)
+    }
+
     /// How the devices fare.
     pub(crate) fn tally(&self) -> Tally {
         let mut tally = Tally { devices: self.devices.len(), ..Tally::default() };
@@ -99,13 +106,6 @@ impl Table {
             tally.faults += usize::from(live.device.fault().is_some());
         }
         tally
-    }
-
-    /// Whether it is the same devices and wires that make up another table.
-    pub(crate) fn is_same(&self, other: &Self) -> bool {
-        let devices = |table: &Self| table.devices.iter().map(|slot| slot.key).collect::<Vec<_>>();
-        let wires = |table: &Self| table.wires.iter().map(|wire| wire.0.clone()).collect::<Vec<_>>();
-        devices(self) == devices(other) && wires(self) == wires(other)
     }
 
     /// A device by its id.

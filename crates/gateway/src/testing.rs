@@ -12,7 +12,7 @@ use crate::device::{Device, Round};
 use crate::failure::Failure;
 use crate::hub::Hub;
 use crate::rates::Rates;
-use crate::site::{Poll, SiteDevice};
+use crate::site::{Nameplate, Poll, SiteDevice};
 use crate::stop::Stop;
 use crate::table::{Slot, Table};
 
@@ -122,6 +122,9 @@ pub(crate) fn site_device(id: &str) -> SiteDevice {
         unit: 1,
         word_order: profile().wire.word_order,
         poll: Poll::default(),
+        model: None,
+        desired_mode: None,
+        nameplate: Nameplate::default(),
     }
 }
 

@@ -103,12 +103,11 @@ impl<'a> Collector<'a> {
     pub fn add(&mut self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) {
         let offset = floor_char_boundary(self.text, span.start);
         let end = floor_char_boundary(self.text, span.end.max(offset));
-        let before = &self.text[..offset];
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
         self.findings.push(Finding {
             file: self.file.to_owned(),
-            line: before.matches('\n').count() + 1,
-            column: before[line_start..].chars().count() + 1,
+            // Counted in the end, for all of them together.
+            line: 0,
+            column: 0,
             offset,
             length: end - offset,
             message: message.into(),
@@ -136,6 +135,19 @@ impl<'a> Collector<'a> {
     pub(crate) fn into_findings(mut self) -> Findings {
         self.findings.sort_by_key(|finding| finding.offset);
         self.findings.dedup();
+        let (mut line, mut column, mut seen) = (1, 1, 0);
+        for finding in &mut self.findings {
+            let mut since = &self.text[seen..finding.offset];
+            if let Some(newline) = since.rfind('\n') {
+                line += since.matches('\n').count();
+                column = 1;
+                since = &since[newline + 1..];
+            }
+            // No editor counts a byte order mark.
+            column += since.trim_start_matches('\u{FEFF}').chars().count();
+            seen = finding.offset;
+            (finding.line, finding.column) = (line, column);
+        }
         Findings { findings: self.findings }
     }
 }
@@ -169,5 +181,16 @@ mod tests {
         );
         let finding = findings.iter().nth(1).unwrap();
         assert_eq!((finding.offset, finding.length), (at, 4));
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_column() {
+        let text = "\u{FEFF}key = 1\r\nkey = 2\r\n";
+        let mut collector = Collector::new("a.toml", text);
+        for at in [text.find('2').unwrap(), text.find('1').unwrap(), 0, 0] {
+            collector.add(at..at + 1, "wrong", "mend it");
+        }
+        let places: Vec<_> = collector.into_findings().iter().map(|f| (f.line, f.column)).collect();
+        assert_eq!(places, [(1, 1), (1, 7), (2, 7)]);
     }
 }

@@ -57,6 +57,7 @@ pub use profile::{
 };
 pub use reading::{Reading, Shown, decode_window, no_reading, reading};
 pub use schema::json_schema;
+pub use suggest::nearest;
 pub use terms::{
     Access, ArgKind, Class, Confirm, DataType, DeviceProof, Kind, OverRead, Parity, Quality, Rate, Risk,
     Role, SignalKind, TimePart, Transport, UnknownWord, WordOrder,

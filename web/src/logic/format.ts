@@ -47,6 +47,11 @@ export function faultText({ name, fault }: DeviceView): string {
   return rest.charAt(0).toUpperCase() + rest.slice(1)
 }
 
+/** A word of the vocabulary as the panels write it: `auto` is `AUTO`, `load_test` is `LOAD TEST`. */
+export function panelText(word: string): string {
+  return word.replaceAll('_', ' ').toUpperCase()
+}
+
 /** An age in the fewest characters that still tell: `3 s`, `12 min`, `5 h`, `3 d`. */
 export function ageText(ms: number): string {
   const seconds = Math.max(0, Math.floor(ms / 1000))
@@ -93,12 +98,43 @@ export function joinedText(view: JoinedView | undefined): string {
   return view?.quality === 'bad' && !view.ts ? 'never read' : 'not read yet'
 }
 
-/** Time of day in the reader's zone, with the date in front unless it is today. */
-export function clockText(time: number, now: number): string {
+const IN_ZONE = new Map<string, Intl.DateTimeFormat | undefined>()
+
+/** Writes times in a zone; undefined where the browser does not know it. */
+function formatOf(zone: string): Intl.DateTimeFormat | undefined {
+  if (!IN_ZONE.has(zone)) {
+    try {
+      // Swedish writes dates as ISO 8601 does.
+      const format = new Intl.DateTimeFormat('sv', {
+        timeZone: zone,
+        dateStyle: 'short',
+        timeStyle: 'medium',
+      })
+      IN_ZONE.set(zone, format)
+    } catch {
+      IN_ZONE.set(zone, undefined)
+    }
+  }
+  return IN_ZONE.get(zone)
+}
+
+/** The site's time zone where its clocks differ from the reader's now; times are then told in it, and it is named. */
+export function zoneOf(zone: string | null | undefined, now: number): string | undefined {
+  const format = zone ? formatOf(zone) : undefined
+  return zone && format && format.format(now) !== localText(now) ? zone : undefined
+}
+
+/** Time of day in the zone, or else in the reader's, with the date in front unless it is today. */
+export function clockText(time: number, now: number, zone?: string): string {
+  const format = zone ? formatOf(zone) : undefined
+  const [at, today] = format ? [format.format(time), format.format(now)] : [localText(time), localText(now)]
+  return at.slice(0, 10) === today.slice(0, 10) ? at.slice(11) : at
+}
+
+function localText(time: number): string {
   const at = new Date(time)
   const day = `${at.getFullYear()}-${pad(at.getMonth() + 1)}-${pad(at.getDate())}`
-  const clock = `${pad(at.getHours())}:${pad(at.getMinutes())}:${pad(at.getSeconds())}`
-  return at.toDateString() === new Date(now).toDateString() ? clock : `${day} ${clock}`
+  return `${day} ${pad(at.getHours())}:${pad(at.getMinutes())}:${pad(at.getSeconds())}`
 }
 
 /** Registers as the manuals and the command line write them: four hex digits each. */

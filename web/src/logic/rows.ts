@@ -130,6 +130,16 @@ export function startsOpen(group: GroupView): boolean {
   return group.rate !== 'on_demand'
 }
 
+/** So many lines are drawn or left out together. */
+const CHUNK = 40
+
+/** The lines in pieces, so that of a long group only what is near need be drawn. */
+export function chunksOf<T>(rows: readonly T[]): T[][] {
+  return Array.from({ length: Math.ceil(rows.length / CHUNK) }, (_, at) =>
+    rows.slice(at * CHUNK, (at + 1) * CHUNK),
+  )
+}
+
 /** Lines a group takes on the page, title included: what the columns are balanced by. */
 export function weightOf(group: GroupView, joined: readonly JoinedPointView[] = []): number {
   if (!startsOpen(group)) return 2

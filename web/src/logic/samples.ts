@@ -4,8 +4,10 @@ import type {
   DeviceView,
   GroupView,
   JoinedPointView,
+  JoinedView,
   PointView,
   Snapshot,
+  StateEvent,
   UnitView,
   ValueView,
   WireDetailView,
@@ -75,20 +77,62 @@ export function alarm(id: string, bit: number, kind: AlarmView['class'], since =
   return { device: id, point, bit, id: `bit_${bit}`, label: `Alarm ${bit}`, class: kind, since: stamp(since) }
 }
 
-type Devices = (Omit<Snapshot['devices'][number], 'joined'> & Partial<Snapshot['devices'][number]>)[]
+interface Told {
+  device: DeviceView
+  values: ValueView[]
+  joined?: JoinedView[]
+}
 
-export function snapshot(devices: Devices, alarms: AlarmView[] = [], started = 0): Snapshot {
+/** A snapshot, and the states that come after it. */
+export type Whole = Snapshot & { states: StateEvent[] }
+
+export function snapshot(devices: Told[], alarms: AlarmView[] = [], started = 0, revision = 1): Whole {
   return {
     site: {
       name: 'North hospital',
       version: '0.1.0',
       started: stamp(started),
       time_zone: null,
-      revision: 1,
+      revision,
       config: { loaded: stamp(started), refused: null },
     },
-    devices: devices.map((device) => ({ joined: [], ...device })),
+    devices: devices.map(({ device }) => device),
     alarms,
+    states: devices.map(({ device: { id }, values, joined = [] }) => ({ device: id, values, joined })),
+  }
+}
+
+/** Streams that a test speaks for: each word goes to all that are open. */
+export class Streams {
+  /** The addresses that were asked for. */
+  asked: string[] = []
+  #open: {
+    close(): void
+    listeners: Map<string, (event: { data?: unknown; lastEventId?: string }) => void>
+  }[] = []
+
+  open = (address: string) => {
+    this.asked.push(address)
+    const listeners = new Map<string, (event: { data?: unknown; lastEventId?: string }) => void>()
+    const source = {
+      listeners,
+      addEventListener: (type: string, act: (event: { data?: unknown }) => void) =>
+        void listeners.set(type, act),
+      close: () => void (this.#open = this.#open.filter((one) => one !== source)),
+    }
+    this.#open.push(source)
+    return source
+  }
+
+  emit(type: string, data?: unknown, lastEventId = ''): void {
+    for (const { listeners } of [...this.#open]) {
+      listeners.get(type)?.({ data: JSON.stringify(data), lastEventId })
+    }
+  }
+
+  tell(whole: Whole): void {
+    this.emit('snapshot', whole)
+    for (const state of whole.states) this.emit('state', state)
   }
 }
 

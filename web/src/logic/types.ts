@@ -18,7 +18,16 @@ export type PointView = Schemas['PointView']
 export type Quality = Schemas['Quality']
 export type Rate = Schemas['Rate']
 export type SiteInfo = Schemas['SiteInfo']
-export type Snapshot = Schemas['SnapshotEvent']
+export interface Snapshot {
+  site: SiteInfo
+  devices: DeviceView[]
+  alarms: AlarmView[]
+}
+export interface StateEvent {
+  device: string
+  values: ValueView[]
+  joined: JoinedView[]
+}
 export type UnitView = Schemas['UnitView']
 export type ValuesEvent = Schemas['ValuesEvent']
 export type ValueView = Schemas['ValueView']

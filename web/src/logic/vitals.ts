@@ -1,4 +1,5 @@
 // The few values that say at a glance how a device is, found by signal, whoever made it.
+import tiles from './tiles.json'
 import type { DeviceView, GroupView, JoinedPointView, PointView, ValueView } from './types'
 
 type Kind = DeviceView['kind']
@@ -15,51 +16,17 @@ interface Wanted {
   card?: readonly Kind[]
 }
 
-const SWITCH = ['open', 'closed'] as const
-const GENSET: Kind[] = ['genset']
-const ATS: Kind[] = ['transfer_switch']
-const AIR: Kind[] = ['compressor']
-const ENGINE: Kind[] = ['genset', 'compressor']
-const [QS1, QS2, QTIE] = ['breaker.src1.closed', 'breaker.src2.closed', 'breaker.tie.closed']
-
-/** In the order of the page. */
-export const TILES: readonly Wanted[] = [
-  { title: 'Mains voltage', signals: ['mains.voltage.average', 'mains.l1.voltage'], card: GENSET },
-  { title: 'Mains frequency', signals: ['mains.frequency'], card: GENSET },
-  { title: 'Mains breaker', signals: ['breaker.mains.closed'], words: SWITCH, card: GENSET },
-  { title: 'Source 1', signals: ['state.src1'], card: ATS },
-  { title: 'Source 1 voltage', signals: ['src1.l1.voltage', 'src1.l1_l2.voltage'], card: ATS },
-  { title: 'Source 1 frequency', signals: ['src1.frequency'] },
-  { title: 'Source 1 switch', signals: [QS1], words: SWITCH, card: ATS },
-  { title: 'Source 2', signals: ['state.src2'], card: ATS },
-  { title: 'Source 2 voltage', signals: ['src2.l1.voltage', 'src2.l1_l2.voltage'], card: ATS },
-  { title: 'Source 2 frequency', signals: ['src2.frequency'] },
-  { title: 'Source 2 switch', signals: [QS2], words: SWITCH, card: ATS },
-  { title: 'Bus tie', signals: [QTIE], words: SWITCH, card: ATS },
-  { title: 'Load side 1', signals: [QS1, QTIE, QS2], feed: 1, card: ATS },
-  { title: 'Load side 2', signals: [QS2, QTIE, QS1], feed: 2, card: ATS },
-  { title: 'Genset', signals: ['state.genset'] },
-  { title: 'Genset voltage', signals: ['genset.voltage.average', 'genset.l1.voltage'], card: GENSET },
-  { title: 'Genset frequency', signals: ['genset.frequency'], card: GENSET },
-  { title: 'Genset breaker', signals: ['breaker.genset.closed'], words: SWITCH, card: GENSET },
-  { title: 'Genset power', signals: ['genset.power.active'], card: GENSET },
-  { title: 'Compressor', signals: ['compressor.loaded'], words: ['unloaded', 'loaded'], card: AIR },
-  { title: 'Discharge pressure', signals: ['compressor.discharge.pressure'], card: AIR },
-  { title: 'Discharge temperature', signals: ['compressor.discharge.temperature'], card: AIR },
-  { title: 'Engine speed', signals: ['engine.speed'], card: ENGINE },
-  { title: 'Oil pressure', signals: ['engine.oil.pressure'], card: ENGINE },
-  { title: 'Coolant', signals: ['engine.coolant.temperature'], card: ENGINE },
-  { title: 'Battery', signals: ['battery.voltage'], card: GENSET },
-  { title: 'Fuel', signals: ['fuel.level'], card: ENGINE },
-  { title: 'Engine hours', signals: ['engine.hours', 'engine.ecu.hours'], card: AIR },
-  { title: 'Next service', signals: ['service.1.hours_left'], card: AIR },
-  { title: 'Source 1 supplied', signals: ['src1.supply.hours'] },
-  { title: 'Source 2 supplied', signals: ['src2.supply.hours'] },
-]
+/** In the order of the page. The gateway writes the first values into the document by the same list. */
+export const TILES = tiles as unknown as readonly Wanted[]
 
 /** The tiles of a card. */
 export function cardOf(kind: Kind): readonly Wanted[] {
   return TILES.filter(({ card }) => card?.includes(kind))
+}
+
+/** Every signal that a card may ask for, whatever its kind. */
+export function cardSignals(): string[] {
+  return signalsOf(TILES.filter(({ card }) => card))
 }
 
 /** Every signal that these tiles may be filled with. */

@@ -1,25 +1,45 @@
-// What the page is made of, in one place: the clock, the stream, the site, and the points fetched beside them.
+// What the page is made of, in one place: the clock, the streams, the site, and the points fetched beside them.
 import { parseRoute, type Route } from '../logic/route'
 import type { PointsView } from '../logic/types'
-import { cardOf, signalsOf, tilesOf } from '../logic/vitals'
+import { cardOf, cardSignals, signalsOf, tilesOf } from '../logic/vitals'
 import { Clock } from './clock.svelte'
 import { Site, type Device } from './site.svelte'
-import { Stream, type Source } from './stream.svelte'
+import { apiOf, eventsAt, type Early, type Source } from './source'
+import { Stream } from './stream.svelte'
 
 const RETRY_MS = 3000
 
 export class Page {
   clock = new Clock()
-  site = new Site()
+  site: Site
+  /** Tells of all devices what their cards show, and their alarms. */
   stream: Stream
   route = $state.raw<Route>(parseRoute(location.hash))
+  /** Nobody looks at this page now. */
+  hidden = $state(document.hidden)
 
-  /** The API lies beside the page, wherever a proxy has put both. */
-  #api = new URL('api/v1/', document.baseURI)
+  #api = apiOf(document.baseURI)
+  #signals = new Set(cardSignals())
+  #open: (address: string) => Source
 
-  constructor(open: (address: string) => Source = (address) => new EventSource(address)) {
+  /** `early` is a stream that was opened before this page was there, `cards` what the document knows of the points. */
+  constructor(
+    open: (address: string) => Source = (address) => new EventSource(address),
+    early?: Early,
+    cards: Record<string, PointsView> = {},
+  ) {
+    this.#open = open
+    this.site = new Site(cards)
+    let waiting = early
     this.stream = new Stream(
-      () => open(new URL('events', this.#api).href),
+      (after) => {
+        const address = eventsAt(this.#api, { signal: [...this.#signals].join(','), last_event_id: after })
+        const first = waiting
+        waiting = undefined
+        if (first?.address === address) return first
+        first?.close()
+        return open(address)
+      },
       (name, payload) => this.site.apply(name, payload),
     )
   }
@@ -30,7 +50,10 @@ export class Page {
     addEventListener('hashchange', () => (this.route = parseRoute(location.hash)))
     addEventListener('online', () => this.stream.wake())
     addEventListener('pageshow', (event) => event.persisted && this.stream.wake())
-    document.addEventListener('visibilitychange', () => document.hidden || this.stream.wake())
+    document.addEventListener('visibilitychange', () => {
+      this.hidden = document.hidden
+      if (!this.hidden) this.stream.wake()
+    })
   }
 
   get live(): boolean {
@@ -40,6 +63,29 @@ export class Page {
   /** The device that the address names. */
   get device(): Device | undefined {
     return this.route.device === undefined ? undefined : this.site.device(this.route.device)
+  }
+
+  /** The device whose every value is shown: its stream is open while somebody looks, for a browser opens few. */
+  get looked(): Device | undefined {
+    return this.hidden || !this.live ? undefined : this.device
+  }
+
+  /** Keeps every value of a device up to date; what is returned ends that. */
+  follow(device: Device): () => void {
+    const stream = new Stream(
+      (after) => this.#open(eventsAt(this.#api, { device: device.view.id, last_event_id: after })),
+      (name, payload) => device.follow(name, payload),
+      () => device.unfollow(),
+    )
+    stream.connect()
+    return () => stream.stop()
+  }
+
+  /** Wants these signals of all devices too, for as long as the page lives. */
+  want(signals: Iterable<string>): void {
+    const before = this.#signals.size
+    for (const signal of signals) this.#signals.add(signal)
+    if (this.#signals.size > before && this.stream.phase !== 'lost') this.stream.renew()
   }
 
   /** Fetches what the points of a device are. */

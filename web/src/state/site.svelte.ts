@@ -1,4 +1,5 @@
-// The site as the gateway tells it: a snapshot first, then changes, applied to what the page shows.
+// The site as the gateway tells it: snapshot and states first, then changes, applied to what the page shows. One stream
+// tells of all devices what their cards show; a second one tells all of the device that is looked at.
 import { announcement } from '../logic/alarms'
 import { decimalsOf, timeOf } from '../logic/format'
 import type {
@@ -8,14 +9,16 @@ import type {
   GroupView,
   JoinedPointView,
   JoinedView,
+  PointsView,
   Rate,
   SiteInfo,
   Snapshot,
+  StateEvent,
   ValuesEvent,
   ValueView,
 } from '../logic/types'
-import type { Tile } from '../logic/vitals'
-import type { EventName } from './stream.svelte'
+import { cardOf, tilesOf, type Tile } from '../logic/vitals'
+import type { EventName } from './source'
 
 /** One point's value. Each has its own state, so that a change redraws one cell. */
 export class Cell {
@@ -47,7 +50,11 @@ export class Device {
   rounds = $state<Partial<Record<Rate, number>>>({})
   /** Which groups (`group/…`) and lines (`point/…`) were opened or closed here; kept when the layout changes. */
   opened = $state<Record<string, boolean>>({})
+  /** A stream of its own keeps all of its values up to date. */
+  followed = false
   #cells = new Map<string, Cell>()
+  /** The points and joined signals that the stream of all devices keeps up to date. */
+  #shared = new Set<string>()
 
   constructor(view: DeviceView) {
     this.view = view
@@ -77,23 +84,52 @@ export class Device {
     return Math.max(0, timer - Math.floor(since / 1000))
   }
 
-  /** Everything the gateway knows of the values, after a gap in the stream. */
-  reset(
-    view: DeviceView,
-    values: readonly ValueView[],
-    joined: readonly JoinedView[],
-    alarms: readonly AlarmView[],
-  ): void {
-    this.view = view
-    this.alarms = alarms
+  /** Everything that the stream of all devices tells of its values. */
+  share({ values, joined }: StateEvent): void {
+    this.#shared = new Set([...values.map(({ id }) => id), ...joined.map(({ signal }) => signal)])
+    if (!this.followed) this.#whole(values, joined)
+  }
+
+  /** What its own stream tells: its values. The other stream has the rest. */
+  follow(name: EventName, payload: unknown): void {
+    if (name === 'state') {
+      const { values, joined } = payload as StateEvent
+      this.followed = true
+      this.#whole(values, joined)
+    } else if (name === 'values') this.round(payload as ValuesEvent)
+  }
+
+  /** Its own stream is gone: what the other one does not tell is not kept up to date any more, and must look so. */
+  unfollow(): void {
+    this.followed = false
+    for (const [id, cell] of this.#cells) {
+      if (cell.view && !this.#shared.has(id)) cell.set(outdated(cell.view))
+    }
+    for (const [signal, view] of Object.entries(this.whole)) {
+      if (!this.#shared.has(signal)) this.whole[signal] = outdated(view)
+    }
+  }
+
+  #whole(values: readonly ValueView[], joined: readonly JoinedView[]): void {
     this.rounds = {}
     this.take(values, joined)
+  }
+
+  /** The last finished round of a rate and what it changed. */
+  round({ rate, ts, changed, joined }: ValuesEvent): void {
+    const read = timeOf(ts)
+    if (read !== undefined) this.rounds[rate] = read
+    this.take(changed, joined)
   }
 
   take(values: readonly ValueView[], joined: readonly JoinedView[]): void {
     for (const value of values) this.cell(value.id).set(value)
     for (const value of joined) this.whole[value.signal] = value
   }
+}
+
+function outdated<View extends ValueView | JoinedView>(view: View): View {
+  return view.quality === 'good' ? { ...view, quality: 'stale' } : view
 }
 
 export class Site {
@@ -106,43 +142,57 @@ export class Site {
     return this.devices.find((device) => device.view.id === id)
   }
 
+  /** What the cards of each profile are made of, where the document brought it along. */
+  #cards: Record<string, PointsView>
+
+  constructor(cards: Record<string, PointsView> = {}) {
+    this.#cards = cards
+  }
+
+  /** What the stream of all devices tells. */
   apply(name: EventName, payload: unknown): void {
     switch (name) {
       case 'snapshot':
         return this.#snapshot(payload as Snapshot)
-      case 'values':
-        return this.#values(payload as ValuesEvent)
+      case 'state': {
+        const state = payload as StateEvent
+        return this.device(state.device)?.share(state)
+      }
+      case 'values': {
+        const values = payload as ValuesEvent
+        const device = this.device(values.device)
+        return device?.followed ? undefined : device?.round(values)
+      }
       case 'device':
         return this.#device(payload as DeviceView)
       case 'alarms':
         return this.#alarms(payload as AlarmsEvent)
+      case 'site':
+        this.view = payload as SiteInfo
     }
   }
 
   #snapshot({ site, devices, alarms }: Snapshot): void {
-    // A gateway that was started again may have other points under the same names.
-    const restarted = this.view !== undefined && this.view.started !== site.started
+    // Another gateway or another site file may have other points under the same names.
+    const other =
+      this.view !== undefined && (this.view.started !== site.started || this.view.revision !== site.revision)
+    if (other) this.#cards = {}
     const before = this.devices.flatMap((device) => device.alarms)
-    this.devices = devices.map(({ device: view, values, joined }) => {
-      const device = (restarted ? undefined : this.device(view.id)) ?? new Device(view)
-      device.reset(
-        view,
-        values,
-        joined,
-        alarms.filter((alarm) => alarm.device === view.id),
-      )
+    this.devices = devices.map((view) => {
+      const device = (other ? undefined : this.device(view.id)) ?? this.#create(view)
+      device.view = view
+      device.alarms = alarms.filter((alarm) => alarm.device === view.id)
       return device
     })
     this.view = site
     this.#speak(announcement(before, alarms))
   }
 
-  #values({ device: id, rate, ts, changed, joined }: ValuesEvent): void {
-    const device = this.device(id)
-    if (!device) return
-    const read = timeOf(ts)
-    if (read !== undefined) device.rounds[rate] = read
-    device.take(changed, joined)
+  #create(view: DeviceView): Device {
+    const device = new Device(view)
+    const points = this.#cards[view.profile]
+    if (points) device.glance = tilesOf(points.groups, points.joined, cardOf(view.kind))
+    return device
   }
 
   #device(view: DeviceView): void {

@@ -1,11 +1,16 @@
 import { describe, expect, test } from 'vitest'
-import { alarm, device, group, point, snapshot, stamp, START, value } from '../logic/samples'
+import { alarm, device, group, point, snapshot, stamp, START, value, type Whole } from '../logic/samples'
 import { Site } from './site.svelte'
+
+function tell(site: Site, whole: Whole): void {
+  site.apply('snapshot', whole)
+  for (const state of whole.states) site.apply('state', state)
+}
 
 function started(): Site {
   const site = new Site()
-  site.apply(
-    'snapshot',
+  tell(
+    site,
     snapshot(
       [
         { device: device('gen1'), values: [value('volts', 230.2), value('amps', 12)] },
@@ -33,7 +38,7 @@ describe('a snapshot', () => {
     const gen1 = site.device('gen1')!
     gen1.groups = [group('G', [point('volts')])]
     site.apply('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(9), changed: [] })
-    site.apply('snapshot', snapshot([{ device: device('gen1'), values: [value('volts', 231)] }]))
+    tell(site, snapshot([{ device: device('gen1'), values: [value('volts', 231)] }]))
     expect(site.devices).toEqual([gen1])
     expect(gen1.groups).toHaveLength(1)
     expect(gen1.cell('volts').view?.value).toBe(231)
@@ -45,9 +50,90 @@ describe('a snapshot', () => {
   test('of a gateway that was started again begins from nothing', () => {
     const site = started()
     const before = site.device('gen1')
-    site.apply('snapshot', snapshot([{ device: device('gen1'), values: [] }], [], 60))
+    tell(site, snapshot([{ device: device('gen1'), values: [] }], [], 60))
     expect(site.device('gen1')).not.toBe(before)
     expect(site.device('gen1')?.cell('volts').view).toBeUndefined()
+  })
+})
+
+describe('another site file', () => {
+  test('may have other points under the same names', () => {
+    const site = started()
+    const before = site.device('gen1')
+    tell(site, snapshot([{ device: device('gen1'), values: [] }], [], 0, 2))
+    expect(site.device('gen1')).not.toBe(before)
+    expect(site.device('gen1')?.cell('volts').view).toBeUndefined()
+  })
+
+  test('that is refused changes nothing but what is known of it', () => {
+    const site = started()
+    const gen1 = site.device('gen1')
+    const refused = { at: stamp(9), reason: 'site.toml:3:1: no' }
+    site.apply('site', { ...site.view, config: { loaded: stamp(0), refused } })
+    expect(site.view?.config.refused).toEqual(refused)
+    expect(site.device('gen1')).toBe(gen1)
+  })
+})
+
+describe('a device with a stream of its own', () => {
+  const all = { device: 'gen1', values: [value('volts', 231), value('oil', 4.2)], joined: [] }
+  const round = (volts: number) => ({
+    device: 'gen1',
+    joined: [],
+    rate: 'fast',
+    ts: stamp(3),
+    changed: [value('volts', volts)],
+  })
+
+  test('is told by that one alone, from its state on', () => {
+    const site = started()
+    const gen1 = site.device('gen1')!
+    site.apply('values', round(232))
+    expect(gen1.cell('volts').view?.value).toBe(232)
+    gen1.follow('state', all)
+    expect(gen1.cell('volts').view?.value).toBe(231)
+    site.apply('values', round(233))
+    expect(gen1.cell('volts').view?.value).toBe(231)
+    gen1.follow('values', round(234))
+    expect(gen1.cell('volts').view?.value).toBe(234)
+  })
+
+  test('keeps its own values when the other stream begins anew', () => {
+    const site = started()
+    const gen1 = site.device('gen1')!
+    gen1.follow('state', all)
+    tell(site, snapshot([{ device: device('gen1'), values: [value('volts', 229)] }]))
+    expect(gen1.cell('volts').view?.value).toBe(231)
+  })
+
+  test('loses it: what nobody tells any more is stale, the rest is told by the other', () => {
+    const site = started()
+    const gen1 = site.device('gen1')!
+    gen1.follow('state', all)
+    gen1.unfollow()
+    expect(gen1.cell('oil').view).toMatchObject({ value: 4.2, quality: 'stale' })
+    expect(gen1.cell('volts').view?.quality).toBe('good')
+    site.apply('values', round(235))
+    expect(gen1.cell('volts').view?.value).toBe(235)
+  })
+})
+
+describe('what the document knows of the cards', () => {
+  const cards = {
+    'datakom-d': { groups: [group('Genset', [point('hz', { signal: 'genset.frequency' })])], joined: [] },
+  }
+
+  test('is taken for the devices of that profile, and not after a restart', () => {
+    const site = new Site(cards)
+    const one = [
+      { device: device('gen1'), values: [] },
+      { device: device('ats1', { profile: 'smartgen-hat821si', kind: 'transfer_switch' }), values: [] },
+    ]
+    tell(site, snapshot(one))
+    expect(site.device('gen1')?.glance?.map(({ title }) => title)).toEqual(['Genset frequency'])
+    expect(site.device('ats1')?.glance).toBeUndefined()
+    tell(site, snapshot(one, [], 60))
+    expect(site.device('gen1')?.glance).toBeUndefined()
   })
 })
 
@@ -133,7 +219,7 @@ describe('alarms', () => {
   test('that did not change are not said again after a reconnection', () => {
     const site = started()
     site.spoken = ''
-    site.apply('snapshot', snapshot([{ device: device('gen1'), values: [] }], [alarm('gen1', 58, 'warning')]))
+    tell(site, snapshot([{ device: device('gen1'), values: [] }], [alarm('gen1', 58, 'warning')]))
     expect(site.spoken).toBe('')
   })
 })

@@ -1,21 +1,20 @@
-// The event stream: opens it, notices when it is gone or silent, and opens it again. What it carries is not its business.
+// The event stream: opens it, notices when it is gone or silent, and opens it again where it ended. What it carries is
+// not its business.
+import { EVENTS, type EventName, type Heard, type Source } from './source'
 
+export type { EventName, Source } from './source'
 export type Phase = 'connecting' | 'live' | 'lost'
 
-const EVENTS = ['snapshot', 'values', 'device', 'alarms'] as const
-export type EventName = (typeof EVENTS)[number]
-
-/** What is used of an EventSource. */
-export interface Source {
-  addEventListener(type: string, listener: (event: { data?: unknown }) => void): void
-  close(): void
-}
-
-/** A gateway that polls anything speaks each second; so long without a word, the stream is opened anew. */
-const SILENCE_MS = 20_000
-/** So long may the snapshot take, on a slow line too. */
+/** So long may the whole state take, on a slow line too. */
 const ANSWER_MS = 15_000
 const LONGEST_WAIT_MS = 10_000
+/** So long without a word, before it is known how often the gateway speaks, the stream is opened anew. */
+const SILENCE_MS = 20_000
+/** Silence is more than four of the usual pauses, but never less than this: values may be five seconds old. */
+const PAUSES = 4
+const SILENCE_AT_LEAST_MS = 4000
+/** A gateway that is there answers within this; until then, silence does not make the values stale. */
+const DOUBT_MS = 1000
 
 export class Stream {
   phase = $state<Phase>('connecting')
@@ -24,30 +23,43 @@ export class Stream {
   /** When the next attempt starts; undefined while one is under way. */
   retryAt = $state<number>()
 
-  #open: () => Source
+  #open: (after: string | undefined) => Source
   #handle: (name: EventName, payload: unknown) => void
+  #gone: (() => void) | undefined
   #source: Source | undefined
   #timer: ReturnType<typeof setTimeout> | undefined
   #failures = 0
+  /** The last event that was taken: the next stream goes on after it. */
+  #last: string | undefined
+  /** How many devices' states are still to come; undefined before the first word. */
+  #missing: number | undefined
+  /** The longest pause between two words that was none of the gateway's absences. */
+  #pause: number | undefined
 
-  constructor(open: () => Source, handle: (name: EventName, payload: unknown) => void) {
+  /**
+   * `open` opens a stream that goes on after the event of that id. With `gone`, which is told that values are not kept
+   * up to date from now on, every stream after that begins from the start.
+   */
+  constructor(
+    open: (after: string | undefined) => Source,
+    handle: (name: EventName, payload: unknown) => void,
+    gone?: () => void,
+  ) {
     this.#open = open
     this.#handle = handle
+    this.#gone = gone
   }
 
   /** Opens the stream, in place of the one there is. */
   connect(): void {
     this.#close()
     this.retryAt = undefined
-    const source = this.#open()
+    this.#missing = undefined
+    const source = this.#open(this.#last)
     this.#source = source
-    let whole = false
     for (const name of EVENTS) {
       source.addEventListener(name, (event) => {
-        if (source !== this.#source) return
-        if (name === 'snapshot') whole = true
-        // Changes mean nothing before the state they change.
-        if (whole) this.#receive(name, event.data)
+        if (source === this.#source) this.#receive(name, event)
       })
     }
     source.addEventListener('error', () => {
@@ -56,39 +68,90 @@ export class Stream {
     this.#after(ANSWER_MS, () => this.#fail())
   }
 
+  /** Asks for everything anew, because something else is asked for than before. */
+  renew(): void {
+    this.#last = undefined
+    this.connect()
+  }
+
   /** The page came back to the foreground or the network returned: the timers may have slept. */
   wake(): void {
     const silence = Date.now() - (this.heardAt ?? 0)
-    if (this.phase === 'lost' || silence > 5000) this.connect()
+    if (this.phase !== 'lost' && silence <= this.#patience()) return
+    if (this.phase === 'live') this.#turn('connecting')
+    this.connect()
   }
 
   stop(): void {
     this.#close()
+    this.#turn('connecting')
   }
 
-  #receive(name: EventName, data: unknown): void {
+  #receive(name: EventName, { data, lastEventId }: Heard): void {
     try {
-      this.#handle(name, JSON.parse(String(data)))
+      const payload: unknown = JSON.parse(String(data))
+      if (name === 'snapshot') this.#missing = (payload as { devices: unknown[] }).devices.length
+      else if (name === 'resumed') this.#missing = 0
+      // Changes mean nothing before the state they change.
+      else if (this.#missing === undefined) return
+      // A reader that fell behind gets states without a snapshot.
+      else if (name === 'state') this.#missing = Math.max(0, this.#missing - 1)
+      this.#handle(name, payload)
     } catch (error) {
-      // Half a state is worse than none: the next snapshot sets it right.
+      // Half a state is worse than none: a snapshot sets it right.
       console.error(`unreadable event "${name}"`, error)
+      this.#last = undefined
       this.#fail()
       return
     }
-    this.phase = 'live'
-    this.heardAt = Date.now()
+    this.#heard()
+    if (this.#missing > 0) return
+    this.#last = lastEventId || this.#last
+    this.#turn('live')
     this.#failures = 0
-    this.#after(SILENCE_MS, () => this.connect())
+  }
+
+  /** A word was heard; what comes after how long without the next one. */
+  #heard(): void {
+    const now = Date.now()
+    if (this.phase === 'live' && this.heardAt !== undefined) {
+      this.#pause = Math.max(this.#pause ?? 0, now - this.heardAt)
+    }
+    this.heardAt = now
+    if (this.#missing) this.#after(ANSWER_MS, () => this.#fail())
+    else this.#after(this.#patience(), () => this.#doubt())
+  }
+
+  /** Nothing was heard for too long. Either there was nothing to say, or the connection is dead without a sign. */
+  #doubt(): void {
+    this.connect()
+    this.#after(DOUBT_MS, () => {
+      this.#turn('connecting')
+      this.#after(ANSWER_MS - DOUBT_MS, () => this.#fail())
+    })
+  }
+
+  #patience(): number {
+    if (this.#pause === undefined) return SILENCE_MS
+    return Math.min(SILENCE_MS, Math.max(SILENCE_AT_LEAST_MS, PAUSES * this.#pause))
   }
 
   #fail(): void {
     this.#close()
-    this.phase = 'lost'
+    this.#turn('lost')
     // Spread, so that many pages do not all come back in one instant.
     const wait = Math.min(1000 * 2 ** this.#failures, LONGEST_WAIT_MS) * (0.8 + 0.4 * Math.random())
     this.#failures += 1
     this.retryAt = Date.now() + wait
     this.#after(wait, () => this.connect())
+  }
+
+  #turn(phase: Phase): void {
+    const was = this.phase
+    this.phase = phase
+    if (was !== 'live' || phase === 'live' || !this.#gone) return
+    this.#last = undefined
+    this.#gone()
   }
 
   #after(ms: number, act: () => void): void {

@@ -1,11 +1,14 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest'
-import { Stream, type Source } from './stream.svelte'
+import { type Heard, type Source } from './source'
+import { Stream } from './stream.svelte'
 
 class FakeSource implements Source {
   closed = false
-  #listeners = new Map<string, (event: { data?: unknown }) => void>()
+  #listeners = new Map<string, (event: Heard) => void>()
 
-  addEventListener(type: string, listener: (event: { data?: unknown }) => void): void {
+  constructor(readonly after: string | undefined) {}
+
+  addEventListener(type: string, listener: (event: Heard) => void): void {
     this.#listeners.set(type, listener)
   }
 
@@ -13,31 +16,41 @@ class FakeSource implements Source {
     this.closed = true
   }
 
-  emit(type: string, data?: unknown): void {
-    this.#listeners.get(type)?.({ data })
+  emit(type: string, data?: unknown, lastEventId = ''): void {
+    this.#listeners.get(type)?.({ data, lastEventId })
   }
 }
 
 let sources: FakeSource[]
 let heard: [string, unknown][]
+let gone: number
 let stream: Stream
 
 const last = () => sources.at(-1)!
-const open = () => last().emit('snapshot', '{"site":1}')
+const open = () => last().emit('snapshot', '{"devices":[]}', 'a1')
+const values = (id = '') => last().emit('values', '{}', id)
+const later = (ms: number) => vi.advanceTimersByTime(ms)
+
+function started(told?: () => void): Stream {
+  const stream = new Stream(
+    (after) => {
+      sources.push(new FakeSource(after))
+      return last()
+    },
+    (name, payload) => heard.push([name, payload]),
+    told,
+  )
+  stream.connect()
+  return stream
+}
 
 beforeEach(() => {
   vi.useFakeTimers({ now: 1_000_000 })
   vi.spyOn(Math, 'random').mockReturnValue(0.5)
   sources = []
   heard = []
-  stream = new Stream(
-    () => {
-      sources.push(new FakeSource())
-      return last()
-    },
-    (name, payload) => heard.push([name, payload]),
-  )
-  stream.connect()
+  gone = 0
+  stream = started()
 })
 
 afterEach(() => {
@@ -47,15 +60,34 @@ afterEach(() => {
 })
 
 describe('while all is well', () => {
-  test('the snapshot makes it live and every event is passed on', () => {
+  test('it is live when the snapshot and the state of every device have come', () => {
+    last().emit('snapshot', '{"devices":[1,2]}')
+    last().emit('state', '{"device":"gen1"}')
     expect(stream.phase).toBe('connecting')
-    open()
-    last().emit('values', '{"rate":"fast"}')
+    last().emit('state', '{"device":"gen2"}')
     expect(stream.phase).toBe('live')
-    expect(heard).toEqual([
-      ['snapshot', { site: 1 }],
-      ['values', { rate: 'fast' }],
-    ])
+    last().emit('values', '{"rate":"fast"}')
+    expect(heard.map(([name]) => name)).toEqual(['snapshot', 'state', 'state', 'values'])
+    expect(heard[3]?.[1]).toEqual({ rate: 'fast' })
+  })
+
+  test('a site without devices is live with its snapshot', () => {
+    open()
+    expect(stream.phase).toBe('live')
+  })
+
+  test('states without a snapshot, for a reader that fell behind, do not end that', () => {
+    open()
+    last().emit('state', '{"device":"gen1"}')
+    expect(stream.phase).toBe('live')
+    later(4000)
+    expect(sources).toHaveLength(2)
+  })
+
+  test('a snapshot in between does not end that', () => {
+    open()
+    last().emit('snapshot', '{"devices":[1]}')
+    expect(stream.phase).toBe('live')
   })
 
   test('a change before the snapshot is dropped', () => {
@@ -120,28 +152,114 @@ describe('when the connection is lost', () => {
   })
 })
 
+describe('a stream that is opened again', () => {
+  test('goes on after the last event', () => {
+    open()
+    values('a2')
+    last().emit('error')
+    later(1000)
+    expect(sources.map(({ after }) => after)).toEqual([undefined, 'a2'])
+    expect(stream.phase).toBe('lost')
+    last().emit('resumed', '{}')
+    expect(stream.phase).toBe('live')
+    values('a3')
+    last().emit('error')
+    later(1000)
+    expect(last().after).toBe('a3')
+  })
+
+  test('begins anew after half a state, and goes on after the last whole one', () => {
+    open()
+    last().emit('snapshot', '{"devices":[1]}', 'a1')
+    last().emit('error')
+    later(1000)
+    expect(last().after).toBe('a1')
+    vi.spyOn(console, 'error').mockReturnValue()
+    last().emit('resumed', '{')
+    later(3000)
+    expect(last().after).toBeUndefined()
+  })
+
+  test('for something else than before begins anew', () => {
+    open()
+    stream.renew()
+    expect(last().after).toBeUndefined()
+    expect(stream.phase).toBe('live')
+  })
+
+  test('begins anew where somebody was told that it is gone', () => {
+    stream.stop()
+    stream = started(() => (gone += 1))
+    last().emit('error')
+    expect(gone).toBe(0)
+    later(1000)
+    open()
+    values('a2')
+    last().emit('error')
+    expect(gone).toBe(1)
+    later(1000)
+    expect(last().after).toBeUndefined()
+    open()
+    stream.stop()
+    expect(gone).toBe(2)
+  })
+})
+
 describe('when nothing is said', () => {
   test('a silent stream is opened anew, and is lost when nobody answers then', () => {
     open()
-    vi.advanceTimersByTime(20_000)
+    later(20_000)
     expect(sources).toHaveLength(2)
     expect(stream.phase).toBe('live')
-    vi.advanceTimersByTime(15_000)
+    later(1000)
+    expect(stream.phase).toBe('connecting')
+    later(14_000)
     expect(stream.phase).toBe('lost')
   })
 
+  test('a gateway that spoke each second is missed soon', () => {
+    open()
+    for (let second = 0; second < 5; second++) {
+      later(1000)
+      values()
+    }
+    later(4000)
+    expect(sources).toHaveLength(2)
+    later(1000)
+    expect(stream.phase).toBe('connecting')
+  })
+
+  test('a gateway that has little to say is not missed sooner each time', () => {
+    open()
+    later(10)
+    values()
+    later(4000)
+    expect(sources).toHaveLength(2)
+    last().emit('resumed', '{}')
+    later(15_000)
+    expect(sources).toHaveLength(2)
+    expect(stream.phase).toBe('live')
+  })
+
   test('a gateway that never answers the first time is lost too', () => {
-    vi.advanceTimersByTime(15_000)
+    later(15_000)
     expect(stream.phase).toBe('lost')
     expect(stream.heardAt).toBeUndefined()
   })
 
-  test('waking up after sleep asks again, waking up at once does not', () => {
+  test('a state that does not come whole is lost', () => {
+    last().emit('snapshot', '{"devices":[1,2]}')
+    later(15_000)
+    expect(stream.phase).toBe('lost')
+  })
+
+  test('waking up after sleep asks again and is not live before the answer, waking up at once does neither', () => {
     open()
     stream.wake()
     expect(sources).toHaveLength(1)
     vi.setSystemTime(1_060_000)
     stream.wake()
     expect(sources).toHaveLength(2)
+    expect(stream.phase).toBe('connecting')
   })
 })

@@ -2,8 +2,18 @@
 import { flushSync, mount, unmount } from 'svelte'
 import { afterEach, beforeEach, expect, test, vi } from 'vitest'
 import App from '../App.svelte'
-import { alarm, device, group, point, snapshot, stamp, START, value } from '../logic/samples'
-import type { Snapshot } from '../logic/types'
+import {
+  alarm,
+  device,
+  group,
+  point,
+  snapshot,
+  stamp,
+  START,
+  Streams,
+  value,
+  type Whole,
+} from '../logic/samples'
 import { Page } from '../state/page.svelte'
 
 let emit: (type: string, data?: unknown) => void
@@ -11,19 +21,17 @@ let page: Page
 let app: Record<string, unknown>
 let asked: string[]
 
-function show(first: Snapshot): void {
-  const listeners = new Map<string, (event: { data?: unknown }) => void>()
+function show(first: Whole): void {
+  const streams = new Streams()
   emit = (type, data) => {
-    listeners.get(type)?.({ data: JSON.stringify(data) })
+    streams.emit(type, data)
     flushSync()
   }
-  page = new Page(() => ({
-    addEventListener: (type, act) => listeners.set(type, act),
-    close: () => undefined,
-  }))
+  page = new Page(streams.open)
   page.start()
   app = mount(App, { target: document.body, props: { page } })
-  emit('snapshot', first)
+  streams.tell(first)
+  flushSync()
 }
 
 const card = (id: string) => document.querySelector<HTMLElement>(`[data-device="${id}"]`)!

@@ -3,8 +3,20 @@ import { flushSync, mount, unmount } from 'svelte'
 import { afterEach, beforeEach, expect, test, vi } from 'vitest'
 import App from '../App.svelte'
 import { deviceLink } from '../logic/route'
-import { alarm, device, group, joined, point, snapshot, stamp, START, value } from '../logic/samples'
-import type { GroupView, JoinedPointView, Snapshot } from '../logic/types'
+import {
+  alarm,
+  device,
+  group,
+  joined,
+  point,
+  snapshot,
+  stamp,
+  START,
+  Streams,
+  value,
+  type Whole,
+} from '../logic/samples'
+import type { GroupView, JoinedPointView } from '../logic/types'
 import { Page } from '../state/page.svelte'
 
 const VOLTS = point('volts', {
@@ -26,26 +38,28 @@ const FLAGS = point('flags', {
 })
 
 let emit: (type: string, data?: unknown) => void
+let tell: (whole: Whole) => void
 let page: Page
 let app: Record<string, unknown>
 let groups: GroupView[]
 let whole: JoinedPointView[]
 
-async function show(first: Snapshot): Promise<void> {
-  const listeners = new Map<string, (event: { data?: unknown }) => void>()
+async function show(first: Whole): Promise<void> {
+  const streams = new Streams()
   emit = (type, data) => {
-    listeners.get(type)?.({ data: JSON.stringify(data) })
+    streams.emit(type, data)
+    flushSync()
+  }
+  tell = (whole) => {
+    streams.tell(whole)
     flushSync()
   }
   vi.stubGlobal('fetch', async () => Response.json({ groups, joined: whole }))
-  location.hash = deviceLink(first.devices[0]?.device.id ?? '')
-  page = new Page(() => ({
-    addEventListener: (type, act) => listeners.set(type, act),
-    close: () => undefined,
-  }))
+  location.hash = deviceLink(first.devices[0]?.id ?? '')
+  page = new Page(streams.open)
   page.start()
   app = mount(App, { target: document.body, props: { page } })
-  emit('snapshot', first)
+  tell(first)
   await vi.waitFor(() => expect(document.querySelector('[data-point]')).not.toBeNull(), 5000)
   flushSync()
 }
@@ -119,7 +133,15 @@ test('address and number come on request, by a button', async () => {
   flushSync()
   expect(button.getAttribute('aria-expanded')).toBe('true')
   const details = text(document.getElementById(button.getAttribute('aria-controls')!))
-  for (const fact of ['10246 · 410247 · 2 registers', 'volts (u16)', '08FE 0000', 'page 11', 'sign']) {
+  for (const fact of [
+    '10246 · 410247 · 0x2806 · 2 registers',
+    'Point volts',
+    'u16: unsigned, 16 bits',
+    'Read 04:00:00, each round',
+    '08FE 0000',
+    'page 11',
+    'does not say for certain whether it can be negative',
+  ]) {
     expect(details).toContain(fact)
   }
 })
@@ -165,7 +187,7 @@ test('a lost connection is told, and every value turns stale', async () => {
   expect(text(line('volts').querySelector('.age'))).toBe('stale, 2 s')
   expect(text(document.querySelector('.summary'))).toContain('Not known')
   vi.advanceTimersByTime(1500)
-  emit('snapshot', snapshot([{ device: device('gen1'), values: [value('volts', 231)] }]))
+  tell(snapshot([{ device: device('gen1'), values: [value('volts', 231)] }]))
   expect(text(document.querySelector('[role="alert"]'))).toBe('')
   expect(text(line('volts').querySelector('.number'))).toBe('231')
 })

@@ -2,7 +2,7 @@
 import { flushSync, mount, unmount } from 'svelte'
 import { afterEach, beforeEach, expect, test, vi } from 'vitest'
 import App from '../App.svelte'
-import { device, snapshot, START, unit, wire, wireDetail } from '../logic/samples'
+import { device, snapshot, START, Streams, unit, wire, wireDetail } from '../logic/samples'
 import type { WireDetailView, WireView } from '../logic/types'
 import { Page } from '../state/page.svelte'
 
@@ -14,20 +14,17 @@ let reached: boolean
 
 async function show(hash: string): Promise<void> {
   location.hash = hash
-  const listeners = new Map<string, (event: { data?: unknown }) => void>()
+  const streams = new Streams()
   vi.stubGlobal('fetch', async (address: URL) => {
     if (!reached) throw new TypeError('network')
     const id = /wires\/(.+)$/.exec(address.pathname)?.[1]
     return Response.json(id === undefined ? wires : details[id])
   })
-  page = new Page(() => ({
-    addEventListener: (type, act) => listeners.set(type, act),
-    close: () => undefined,
-  }))
+  page = new Page(streams.open)
   page.start()
   app = mount(App, { target: document.body, props: { page } })
   const dev1 = device('dev1', { name: 'Compressor <1>', kind: 'compressor' })
-  listeners.get('snapshot')?.({ data: JSON.stringify(snapshot([{ device: dev1, values: [] }])) })
+  streams.tell(snapshot([{ device: dev1, values: [] }]))
   flushSync()
 }
 

@@ -5,6 +5,7 @@ use std::io;
 use busbar_emulator::{Config, Emulation, StartError};
 use busbar_gateway::Site;
 use busbar_link::Endpoint;
+use jiff::tz::{TimeZone, TimeZoneDatabase};
 use serde::Serialize;
 
 use super::{emulate, run};
@@ -16,10 +17,12 @@ const USUAL_PORT: u16 = 1502;
 /// The serial line of the site: one wire, three units.
 const LINE: &str = "rtu://pty?baud=9600&parity=none&stop=1";
 
-/// One controller of the site.
+/// The site, with places for what is known once the imitations listen.
+const SITE: &str = include_str!("demo.toml");
+
+/// One controller of the site, as it is imitated.
 struct Member {
     id: &'static str,
-    name: &'static str,
     key: &'static str,
     model: &'static str,
     unit: u8,
@@ -27,27 +30,13 @@ struct Member {
     title: &'static str,
 }
 
-const GENSET: Member = Member {
-    id: "genset-1",
-    name: "Genset 1",
-    key: "datakom-d",
-    model: "D-500",
-    unit: 1,
-    title: "Datakom D-500",
-};
+const GENSET: Member =
+    Member { id: "genset-1", key: "datakom-d", model: "D-500", unit: 1, title: "Datakom D-500" };
 
 const ON_THE_LINE: [Member; 3] = [
-    Member {
-        id: "genset-2",
-        name: "Genset 2",
-        key: "datakom-dkg705",
-        model: "DKG-705",
-        unit: 1,
-        title: "Datakom DKG-705",
-    },
+    Member { id: "genset-2", key: "datakom-dkg705", model: "DKG-705", unit: 1, title: "Datakom DKG-705" },
     Member {
         id: "switch-1",
-        name: "Transfer switch",
         key: "smartgen-hat821si",
         model: "HAT821SI",
         unit: 2,
@@ -55,7 +44,6 @@ const ON_THE_LINE: [Member; 3] = [
     },
     Member {
         id: "compressor-1",
-        name: "Compressor",
         key: "smartgen-acc1700",
         model: "ACC1700CAN",
         unit: 3,
@@ -161,38 +149,58 @@ fn told(page: &str, tcp: &Endpoint, serial: &Endpoint) -> String {
 
 /// The site file that a person would write for this.
 fn site(tcp: &Endpoint, serial: &Endpoint) -> Result<Site, Failure> {
-    let mut text = format!(
-        r#"
-[site]
-name = "Demonstration site"
-[server]
-listen = "127.0.0.1:8080"
-[[wires]]
-id = "network"
-endpoint = "{tcp}"
-[[wires]]
-id = "line"
-endpoint = "{serial}"
-"#
-    );
-    for (member, endpoint) in members(tcp, serial) {
-        let Member { id, name, key, unit, .. } = member;
-        let (wire, poll) = match endpoint == serial {
-            // What three units at 9600 baud can keep.
-            true => ("line", "poll = { fast = \"2s\", slow = \"20s\" }"),
-            false => ("network", ""),
-        };
-        text += &format!(
-            r#"
-[[devices]]
-id = "{id}"
-name = "{name}"
-profile = "{key}"
-wire = "{wire}"
-unit = {unit}
-{poll}
-"#
-        );
-    }
+    // In a container or on a machine without a clock of its own the zone may not be known.
+    let zone = TimeZone::try_system().ok();
+    let zone = zone.as_ref().and_then(TimeZone::iana_name).filter(|name| is_known(name));
+    let text = SITE
+        .replace("{time_zone}", &zone.map(|name| format!("time_zone = \"{name}\"")).unwrap_or_default())
+        .replace("{network}", &tcp.to_string())
+        .replace("{line}", &serial.to_string());
     Site::parse("demonstration", &text).map_err(Failure::failed)
+}
+
+/// Whether a site file takes that zone: a machine may have names of its own.
+fn is_known(zone: &str) -> bool {
+    TimeZoneDatabase::bundled().get(zone).is_ok_and(|zone| !zone.is_unknown())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_site_has_what_is_imitated_and_draws_all_of_it() {
+        let (tcp, serial) = ("tcp://127.0.0.1:1502".parse().unwrap(), LINE.replace("pty", "/dev/pts/9"));
+        let serial = serial.parse().unwrap();
+        let site = site(&tcp, &serial).unwrap_or_else(|failure| panic!("{failure:?}"));
+        assert!(site.warnings.is_empty(), "{:?}", site.warnings);
+        let imitated: Vec<_> = members(&tcp, &serial)
+            .map(|(member, endpoint)| (member.id, member.key, Some(member.model), member.unit, endpoint))
+            .collect();
+        let polled: Vec<_> = site
+            .devices
+            .iter()
+            .map(|device| {
+                let endpoint = &site.wires[device.wire].endpoint;
+                (
+                    device.id.as_str(),
+                    device.profile.key.as_str(),
+                    device.model.as_deref(),
+                    device.unit,
+                    endpoint,
+                )
+            })
+            .collect();
+        assert_eq!(polled, imitated);
+        for device in &site.devices {
+            let is_drawn = site.diagram.nodes.iter().any(|node| node.device.as_ref() == Some(&device.id));
+            assert!(is_drawn, "{}", device.id);
+        }
+    }
+
+    #[test]
+    fn a_zone_of_this_machine_alone_is_left_out() {
+        assert!(is_known("Europe/Berlin"));
+        assert!(!is_known("Etc/Unknown") && !is_known("Local/Here"));
+    }
 }

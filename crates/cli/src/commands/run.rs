@@ -64,7 +64,7 @@ pub(crate) fn run(args: &args::Run, json: bool) -> Result<(), Failure> {
 
 /// Does what signals ask for, and tells the service manager, until it is time to stop.
 async fn attend(mut gateway: Gateway, args: &args::Run, mut stop: Stop, mut reloads: Reloads) {
-    let mut manager = Manager::default();
+    let mut manager = Manager::new();
     manager.ready();
     let mut looks = every(LOOK);
     let mut beats = manager.beat().map(every);
@@ -77,7 +77,7 @@ async fn attend(mut gateway: Gateway, args: &args::Run, mut stop: Stop, mut relo
                 manager.ready();
             }
             _ = looks.tick() => manager.status(gateway.tally()),
-            () = tick(&mut beats) => manager.lives(gateway.hangs()),
+            () = tick(&mut beats) => manager.lives(gateway.heartbeat()),
         }
     }
     manager.stopping();

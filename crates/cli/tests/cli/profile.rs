@@ -178,11 +178,11 @@ fn a_file_that_cannot_be_read_is_one_sentence() {
     call(["profile", "check", &missing])
         .fails()
         .prints("")
-        .says_in_one_sentence("cannot be read: No such file");
+        .says_in_one_sentence("cannot be read: there is no such file");
     call(["profile", "show", &missing])
         .fails()
         .prints("")
-        .says_in_one_sentence("cannot be read: No such file");
+        .says_in_one_sentence("cannot be read: there is no such file");
     let binary = folder.path().join("binary.toml");
     std::fs::write(&binary, [0xFF, 0xFE, 0x00]).unwrap();
     call(["profile", "check", &binary.display().to_string()])

@@ -248,12 +248,76 @@ fn mistakes_in_a_site_file_start_nothing() {
     }
 }
 
+/// What `busbar run` says of a site file that cannot even be read.
+fn refusal(file: &std::path::Path) -> String {
+    let call =
+        call(["run", "--config", file.to_str().unwrap(), "--listen", "127.0.0.1:0"]).fails().prints("");
+    call.err()
+}
+
 #[test]
-fn a_missing_site_file_is_one_sentence() {
-    busbar("run --config /nonexistent/site.toml")
-        .fails()
-        .prints("")
-        .says_in_one_sentence("/nonexistent/site.toml cannot be read");
+fn a_site_file_that_cannot_be_read_is_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let cannot = |path: &std::path::Path, why: &str| {
+        format!("busbar: site file {} cannot be read: {why}\n", path.display())
+    };
+    let missing = file("missing.toml");
+    assert_eq!(refusal(&missing), cannot(&missing, "there is no such file; check the path"));
+    assert_eq!(refusal(folder.path()), cannot(folder.path(), "it is a folder; name the file in it"));
+
+    // Sparse: it takes no room on the disk.
+    let large = file("large.toml");
+    std::fs::File::create(&large).unwrap().set_len(100 << 20).unwrap();
+    let expected = format!(
+        "busbar: site file {} is larger than 16 MiB, which none needs; check that it is the right file\n",
+        large.display()
+    );
+    assert_eq!(refusal(&large), expected);
+    #[cfg(unix)]
+    assert!(refusal(std::path::Path::new("/dev/zero")).contains("is larger than 16 MiB"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_site_file_of_somebody_else_is_one_sentence() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("site.toml");
+    std::fs::write(&file, site("tcp://127.0.0.1:1")).unwrap();
+    std::fs::set_permissions(&file, PermissionsExt::from_mode(0o000)).unwrap();
+    // Root reads everything.
+    if std::fs::read(&file).is_err() {
+        assert_eq!(
+            refusal(&file),
+            format!(
+                "busbar: site file {} cannot be read: this user may not read it; give the right, or start as another \
+                 user\n",
+                file.display()
+            )
+        );
+    }
+}
+
+#[test]
+fn an_empty_site_file_is_told_what_to_begin_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(folder.path(), "site.toml", "");
+    let err = call(["run", "--config", &file]).fails().prints("").err();
+    assert!(err.contains("site.toml:1:1: there is nothing in this file"), "{err}");
+    assert!(err.contains("write [site] and name"), "{err}");
+}
+
+#[test]
+fn a_site_file_from_another_system_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!("\u{FEFF}{}", site("tcp://127.0.0.1:1").replace('\n', "\r\n"));
+    let config = write(folder.path(), "site.toml", &text);
+    let mut service = Service::start(["run", "--config", &config, "--listen", "127.0.0.1:0", "--json"]);
+    let shown: Value = serde_json::from_str(&service.line()).unwrap();
+    assert_eq!((&shown["site"], &shown["devices"]), (&json!("Test site"), &json!(1)));
+    assert_eq!(service.signal("INT").0, Some(0));
 }
 
 #[test]

@@ -15,7 +15,7 @@ use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema,
 use utoipa::openapi::{RefOr, schema};
 use utoipa::{PartialSchema, ToSchema};
 
-pub use self::diagram::{ConnectionView, DiagramView, NodeView};
+pub use self::diagram::{ConnectionView, DiagramView, NodeKind, NodeView};
 pub use self::event::{AlarmsEvent, ResumedEvent, SnapshotEvent, StateEvent, ValuesEvent};
 pub use self::wire::{
     ExceptionCount, LatencyBucket, LatencyView, PlanView, PlannedRead, PlannedRound, UnitState, UnitView,

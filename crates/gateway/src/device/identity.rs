@@ -9,7 +9,7 @@ use busbar_profile::{Profile, WordOrder, builtins};
 
 use crate::api::types::{Identity, NameplateView};
 use crate::failure::Failure;
-use crate::site::SiteDevice;
+use crate::site::{Nameplate, SiteDevice};
 
 /// What the site file expects of a device beside its profile.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -23,8 +23,13 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    pub(crate) fn of(_site: &SiteDevice) -> Self {
-        Self::default()
+    pub(crate) fn of(site: &SiteDevice) -> Self {
+        let Nameplate { power_kw, tank_l, battery_v } = site.nameplate;
+        Self {
+            model: site.model.clone(),
+            desired_mode: site.desired_mode.clone(),
+            nameplate: NameplateView { power_kw, tank_l, battery_v },
+        }
     }
 }
 
@@ -288,4 +293,110 @@ fn registers_of(read: Read) -> String {
 /// The family of a profile as a person calls it.
 fn family(profile: &Profile) -> String {
     format!("{} {}", profile.vendor, profile.models.join("/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use busbar_profile::builtin;
+    use busbar_profile::signature::answers;
+
+    use super::*;
+    use crate::testing::{outage, refusal, site_device, timeout};
+
+    fn site(key: &str) -> SiteDevice {
+        SiteDevice { profile: builtin(key).unwrap(), ..site_device("gen1") }
+    }
+
+    fn wanting(model: &str) -> Expected {
+        Expected { model: Some(model.to_owned()), ..Expected::default() }
+    }
+
+    /// Plays a check: what comes of it, and the addresses that were asked.
+    fn play(
+        mut check: Check,
+        mut device: impl FnMut(Read) -> Result<Vec<u16>, Failure>,
+    ) -> (Finding, Vec<u16>) {
+        let mut asked = Vec::new();
+        while let Some(Question { read, .. }) = check.next() {
+            asked.push(read.address);
+            check.take(device(read));
+        }
+        (check.finding().unwrap(), asked)
+    }
+
+    /// A device of a family whose registers all hold the same.
+    fn of(key: &'static str, holds: u16) -> impl FnMut(Read) -> Result<Vec<u16>, Failure> {
+        move |read| match answers(builtin(key).unwrap(), read) {
+            true => Ok(vec![holds; read.count.into()]),
+            false => Err(refusal(2)),
+        }
+    }
+
+    fn known(finding: &Finding) -> &Known {
+        let Finding::Known(known) = finding else { panic!("{finding:?}") };
+        known
+    }
+
+    fn datakom(expected: &Expected) -> Check {
+        Check::new(&site("datakom-d"), expected, None)
+    }
+
+    #[test]
+    fn who_names_the_wanted_model_is_confirmed_after_one_read() {
+        for expected in [Expected::default(), wanting("D-500")] {
+            let (finding, asked) = play(datakom(&expected), of("datakom-d", 0xD500));
+            let Known { verdict, detail, model } = known(&finding);
+            assert_eq!((*verdict, *model, asked.len()), (Identity::Confirmed, Some("D-500"), 1));
+            assert_eq!(detail, "it says that it is a D-500");
+        }
+        let (finding, _) = play(datakom(&wanting("D-700")), of("datakom-d", 0xD500));
+        assert_eq!(known(&finding).verdict, Identity::Wrong);
+        assert_eq!(known(&finding).detail, "it says that it is a D-500, and the site file wants a D-700");
+        for code in [0, 0xFFFF, 0xD999] {
+            let (finding, _) = play(datakom(&wanting("D-700")), of("datakom-d", code));
+            assert_eq!(known(&finding).verdict, Identity::Plausible, "{code:04X}h");
+        }
+    }
+
+    #[test]
+    fn another_family_is_named_where_it_is_the_only_one_that_fits() {
+        let (finding, asked) = play(datakom(&Expected::default()), of("smartgen-hat821si", 1));
+        let found = known(&finding);
+        assert_eq!((found.verdict, asked.len()), (Identity::Wrong, 5), "{found:?}");
+        assert!(found.detail.ends_with("it answers as a SmartGen HAT821SI does (profile smartgen-hat821si)"));
+        // Whoever refuses all that is asked is none of them.
+        let (finding, _) = play(datakom(&Expected::default()), |_| Err(refusal(1)));
+        assert_eq!(known(&finding).verdict, Identity::Wrong);
+        assert!(!known(&finding).detail.contains("profile"), "{finding:?}");
+        // Asked again, the others are not.
+        let again = Check::new(&site("datakom-d"), &Expected::default(), Some(known(&finding).clone()));
+        let (same, asked) = play(again, |_| Err(refusal(1)));
+        assert_eq!((same, asked.len()), (finding, 2));
+    }
+
+    #[test]
+    fn only_a_plain_refusal_of_both_says_that_it_is_another() {
+        let first = Check::new(&site("datakom-d"), &Expected::default(), None).next().unwrap().read.address;
+        let second = |answer: Result<Vec<u16>, Failure>, other: Result<Vec<u16>, Failure>| {
+            play(datakom(&Expected::default()), move |read| {
+                if read.address == first { answer.clone() } else { other.clone() }
+            })
+            .0
+        };
+        let good = || Ok(vec![7]);
+        for doubt in [refusal(2), refusal(6), timeout()] {
+            let finding = second(Err(doubt.clone()), good());
+            assert_eq!(known(&finding).verdict, Identity::Plausible, "{doubt}");
+        }
+        for (one, other) in [(refusal(6), refusal(2)), (refusal(2), refusal(6)), (refusal(2), timeout())] {
+            let finding = second(Err(one), Err(other));
+            assert!(matches!(finding, Finding::Unclear(_)), "{finding:?}");
+        }
+        assert_eq!(second(Err(timeout()), Err(refusal(2))), Finding::Unclear(refusal(2)));
+        assert_eq!(second(Err(timeout()), Err(timeout())), Finding::Silent(timeout()));
+        // Over a wire that is down nothing else is asked.
+        let (finding, asked) =
+            play(datakom(&Expected::default()), |_| Err(outage(busbar_link::Cause::Refused)));
+        assert!(matches!(finding, Finding::Silent(_)) && asked.len() == 1, "{finding:?}");
+    }
 }

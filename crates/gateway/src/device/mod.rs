@@ -205,7 +205,7 @@ impl Device {
             self.last_seen = Some(ts);
             self.identified(known, ts, &mut changes);
         }
-        if !self.is_wrong() {
+        if !self.is_wrong() || round.silence.is_some() {
             self.reached(&mut round, ts);
             let covered = self.store(&round, (now, ts), &mut changes);
             match self.silence.clone() {

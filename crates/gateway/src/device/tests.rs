@@ -391,3 +391,119 @@ fn what_comes_along_is_read_but_its_absence_is_no_failure() {
     device.finish(failed(Rate::Fast, 100, 12, refusal(4)), at(2), ts(2));
     assert_eq!(value(&device, "hours").quality, Shown::Good, "it was not due");
 }
+
+fn wrong() -> Round {
+    let known = Known {
+        verdict: Identity::Wrong,
+        detail: "it says that it is a T-2, and the site file wants a T-1".to_owned(),
+        model: Some("T-2"),
+    };
+    Round { rates: crate::rates::POLLED.into_iter().collect(), identity: Some(known), ..Round::default() }
+}
+
+#[test]
+fn of_another_device_nothing_is_taken_and_nothing_kept() {
+    let mut device = running();
+    device.finish(answered(Rate::Fast, &[(100, &with(&[(10, 1)]))]), at(1), ts(1));
+    let changes = device.finish(wrong(), at(2), ts(2));
+    assert!(changes.alarms && changes.device);
+    assert_eq!(changes.values.len(), 11, "{:?}", changed(&changes));
+    for index in (0..profile().points.len()).filter(|index| device.shows(*index)) {
+        let value = device.value(index);
+        assert_eq!((&value.value, value.quality), (&PointValue::None, Shown::Bad), "{value:?}");
+        assert_eq!((value.raw, value.ts), (None, None));
+        assert!(value.error.unwrap().starts_with("another device answers in its place: it says that"));
+    }
+    let view = device.view();
+    assert_eq!((view.online, view.identity.verdict, view.alarms.shutdown), (true, Identity::Wrong, 0));
+    assert_eq!((view.identity.checked, view.last_seen), (Some(ts(2)), Some(ts(2))));
+    assert!(
+        view.fault.unwrap().starts_with("Genset 1 is not what the site file says: it says that it is a T-2")
+    );
+    assert!(view.alarms_fault.unwrap().contains("another device"));
+
+    // Said once.
+    assert_eq!(device.finish(wrong(), at(5), ts(5)), Changes::default());
+    assert_eq!(device.view().identity.checked, Some(ts(5)));
+    assert_eq!(device.expire(at(1_000)), [], "there is nothing that could grow old");
+
+    // Silent, it may be anybody.
+    device.finish(silence(), at(6), ts(6));
+    let view = device.view();
+    assert_eq!((view.identity.verdict, view.online), (Identity::Unknown, false));
+    assert!(view.fault.unwrap().contains("cannot be read"));
+
+    // And the right one is believed from its first round on.
+    device.finish(wrong(), at(7), ts(7));
+    let right = Known { verdict: Identity::Confirmed, detail: "it is".to_owned(), model: Some("T-1") };
+    let round = Round { identity: Some(right), ..answered(Rate::Fast, &[(100, &FAST)]) };
+    let changes = device.finish(round, at(8), ts(8));
+    assert!(changes.device && changed(&changes).contains(&"voltage"));
+    let view = device.view();
+    assert_eq!(
+        (view.identity.verdict, view.fault, view.model.as_deref()),
+        (Identity::Confirmed, None, Some("T-1"))
+    );
+    assert_eq!(value(&device, "voltage").quality, Shown::Good);
+}
+
+#[test]
+fn a_device_may_say_in_any_round_that_it_is_another_model() {
+    let mut device = device();
+    device.expected.model = Some("T-1".to_owned());
+    device.finish(answered(Rate::Once, &[(130, &[1])]), at(0), ts(0));
+    assert_eq!(device.view().identity.verdict, Identity::Confirmed);
+    let changes = device.finish(answered(Rate::Once, &[(130, &[2])]), at(1), ts(1));
+    assert!(changes.device && device.is_wrong());
+    assert_eq!(value(&device, "identity").quality, Shown::Bad);
+}
+
+#[test]
+fn desired_and_actual_are_told_apart() {
+    let mut device = device();
+    assert_eq!(device.view().desired, None, "the site file asks for nothing");
+    device.expected.desired_mode = Some("manual".to_owned());
+    let met = |device: &Device| device.view().desired.unwrap().met;
+    assert_eq!(met(&device), None, "not read yet");
+    device.finish(answered(Rate::Fast, &[(100, &FAST)]), at(0), ts(0));
+    assert_eq!(met(&device), Some(false), "it is off");
+    let changes = device.finish(answered(Rate::Fast, &[(100, &with(&[(1, 2)]))]), at(1), ts(1));
+    assert_eq!((met(&device), changes.device), (Some(true), true));
+    device.finish(answered(Rate::Fast, &[(100, &with(&[(1, 9)]))]), at(2), ts(2));
+    assert_eq!(met(&device), None, "nobody knows what that mode is");
+    device.finish(answered(Rate::Fast, &[(100, &with(&[(1, 2)]))]), at(3), ts(3));
+    device.finish(silence(), at(4), ts(4));
+    assert_eq!(met(&device), None);
+}
+
+#[test]
+fn half_of_a_long_point_leaves_the_other_half_alone() {
+    let mut device = running();
+    let whole: &[(u16, &[u16])] = &[(130, &[2; 16]), (146, &[2; 5])];
+    device.finish(answered(Rate::Once, whole), at(1), ts(1));
+    let mut round = answered(Rate::Once, &[(130, &[1; 16])]);
+    round.failures = failed(Rate::Once, 146, 5, timeout()).failures;
+    device.finish(round, at(2), ts(2));
+    let curve = value(&device, "curve");
+    assert_eq!((curve.quality, curve.raw), (Shown::Bad, Some(vec![2; 20])), "not the half of each");
+    assert_eq!(device.view().model.as_deref(), Some("T-1"), "what lies beside it is taken");
+}
+
+#[test]
+fn what_was_read_on_demand_grows_old_as_it_took_long() {
+    let mut device = running();
+    let picture = |took| Round { took, ..answered(Rate::OnDemand, &[(152, &[1; 8])]) };
+    let changes = device.finish(picture(at(1)), at(1), ts(1));
+    assert_eq!((changed(&changes), device.last_round(Rate::OnDemand)), (vec!["picture"], Some(ts(1))));
+    let ages = |device: &mut Device, second| {
+        device.finish(answered(Rate::Fast, &[(100, &FAST)]), at(second), ts(0));
+        device.expire(at(second)).into_iter().any(|(rate, _)| rate == Rate::OnDemand)
+    };
+    assert!(!ages(&mut device, 6) && ages(&mut device, 7));
+    assert_eq!(value(&device, "picture").quality, Shown::Stale);
+    // On a slow wire a picture takes long, and is as good as any until three more could have come.
+    device.finish(picture(at(40)), at(50), ts(50));
+    assert!(!ages(&mut device, 170) && ages(&mut device, 171));
+    device.finish(silence(), at(172), ts(172));
+    assert_eq!(value(&device, "picture").quality, Shown::Bad);
+}

@@ -102,6 +102,12 @@ impl Device {
             && (about.rate != Rate::OnDemand || point.read.is_some() || point.failure.is_some())
     }
 
+    /// Every value there is, in address order.
+    #[cfg(test)]
+    pub(crate) fn values(&self) -> Vec<ValueView> {
+        (0..self.points.len()).filter(|index| self.shows(*index)).map(|index| self.value(index)).collect()
+    }
+
     /// Every signal that several points make up, in the order of the profile.
     pub(crate) fn joined_views(&self) -> Vec<JoinedView> {
         (0..self.joined.len()).map(|index| self.joined(index)).collect()

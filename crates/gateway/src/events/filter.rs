@@ -10,7 +10,7 @@ use busbar_profile::{Profile, Rate};
 use super::event::{About, Event, Frame};
 use crate::api::{EventsQuery, Problem};
 use crate::looks::Look;
-use crate::rates::POLLED;
+use crate::rates::Rates;
 use crate::table::{Slot, Table};
 
 /// Most groups that a sentence names.
@@ -168,7 +168,7 @@ pub(super) struct Wanted {
     /// By index in the profile's joined signals.
     joined: Vec<bool>,
     /// Rates that something wanted is read at.
-    rates: Vec<Rate>,
+    rates: Rates,
 }
 
 impl Wanted {
@@ -198,11 +198,10 @@ impl Wanted {
             .collect();
         let read = profile.points.iter().enumerate().filter(|(index, _)| points[*index]);
         let made = profile.joined().iter().zip(&joined).filter(|(_, wanted)| **wanted);
-        let rates: HashSet<Rate> = read
+        let rates = read
             .map(|(_, point)| point.rate)
             .chain(made.map(|(joined, _)| crate::joined::rate(profile, joined)))
             .collect();
-        let rates = POLLED.into_iter().chain([Rate::OnDemand]).filter(|rate| rates.contains(rate)).collect();
         Self { id: IDS.fetch_add(1, Ordering::Relaxed), profile, points, joined, rates }
     }
 
@@ -215,7 +214,7 @@ impl Wanted {
     }
 
     pub(super) fn has_rate(&self, rate: Rate) -> bool {
-        self.rates.contains(&rate)
+        self.rates.contains(rate)
     }
 }
 

@@ -126,13 +126,13 @@ async fn a_snapshot_first_then_each_state_then_what_changes() {
     assert_eq!(states.each_ref().map(|event| event.name.as_str()), ["state", "state"]);
     assert_eq!(states.each_ref().map(|event| event.data["device"].as_str().unwrap()), ["gen1", "gen2"]);
     assert_eq!(states.each_ref().map(|event| event.id.is_some()), [false, true], "the last one has an id");
-    let slot = &hub.table().devices[0];
-    let live = slot.lock();
-    let shown = (0..live.device.site().profile.points.len()).filter(|index| live.device.shows(*index));
-    let values: Vec<_> = shown.map(|index| live.device.value(index)).collect();
+    let (values, joined) = {
+        let slot = &hub.table().devices[0];
+        let live = slot.lock();
+        (live.device.values(), live.device.joined_views())
+    };
     assert_eq!(states[0].data["values"], json!(values));
-    assert_eq!(states[0].data["joined"], json!(live.device.joined_views()));
-    drop(live);
+    assert_eq!(states[0].data["joined"], json!(joined));
 
     round(&hub, 0, &voltage(2310));
     let changed = told.next().await;
@@ -199,7 +199,7 @@ async fn what_was_read_on_demand_is_told_so() {
     let mut told = reader(&hub, "group=display");
     told.over_the_state().await;
     let picture = [0xAAAA; 8];
-    hub.finish(&hub.table().devices[0], answered(Rates::default(), &[(152, &picture)]));
+    hub.finish(&hub.table().devices[0], answered(Rate::OnDemand, &[(152, &picture)]));
     let event = told.next().await;
     assert_eq!((event.name.as_str(), &event.data["rate"]), ("values", &json!("on_demand")));
     assert_eq!(ids(&event.data["changed"]), ["picture"]);
@@ -338,50 +338,56 @@ async fn a_reader_of_one_device_hears_of_no_other() {
     assert_eq!((event.name.as_str(), &event.data["device"]), ("values", &json!("gen2")));
 }
 
+/// A round in which every polled point has another value than in the one before.
+fn other_round(hub: &Hub) {
+    let slot = &hub.table().devices[0];
+    let turn = slot.lock().sequence as u16;
+    let mode = 1 + turn % 2;
+    let registers = [5 * (turn % 2), mode, turn, 0, 2302 + turn, 0, 215 + turn, 0, 1234 + turn, 0, 0, 0];
+    let all = Rates::from_iter([Rate::Fast, Rate::Slow]);
+    hub.finish(slot, answered(all, &[(100, &registers), (126, &[turn, 0])]));
+}
+
 #[tokio::test]
 async fn only_what_is_asked_for_is_told() {
     let (hub, _announcer) = site(&["gen1"]);
-    let full = [0, 1, 0, 0, 2302, 0, 215, 0, 1234, 0, 0, 0];
-    let all = Rates::from_iter([Rate::Fast, Rate::Slow, Rate::Once]);
-    let cases: [(&str, &[&str], &[(&str, &[&str])]); 5] = [
-        ("signal=genset.l1.voltage,nonsense", &["voltage"], &[("fast", &["voltage"])]),
-        ("signal=engine.hours", &["hours"], &[("slow", &["hours"])]),
-        ("group=service", &["hours", "starts"], &[("slow", &["hours", "starts"])]),
-        (
-            "group=service&signal=mode",
-            &["mode", "hours", "starts"],
-            &[("fast", &["mode"]), ("slow", &["hours", "starts"])],
-        ),
-        ("signal=", &[], &[]),
-    ];
-    for (query, state, rounds) in cases {
-        let mut told = reader(&hub, query);
-        let mut told_again = reader(&hub, query);
-        assert_eq!(told.next().await.data["devices"].as_array().unwrap().len(), 1);
-        assert_eq!(ids(&told.next().await.data["values"]), state, "{query}");
-        told_again.over_the_state().await;
-        // Another value each time, so that everything changes.
-        let mut registers = full;
-        for (place, register) in registers.iter_mut().enumerate() {
-            *register = match place {
-                10 | 11 => 0,
-                1 => 3 - hub.table().devices[0].lock().sequence as u16 % 2,
-                _ => *register + 1,
-            };
+    other_round(&hub);
+    // Query, what it holds of the fast and of the slow points.
+    for (query, fast, slow) in [
+        ("signal=genset.l1.voltage,nonsense", "voltage", ""),
+        ("signal=engine.hours", "", "hours"),
+        ("group=service", "", "hours,starts"),
+        ("group=service&signal=mode,state.engine", "status,mode", "hours,starts"),
+        ("signal=", "", ""),
+        ("group=state,service", "status,mode,timer,voltage,temperature", "hours,starts"),
+    ] {
+        // Two who want the same, and one who wants something else: each gets its own.
+        let mut readers = [reader(&hub, query), reader(&hub, query)];
+        let mut other = reader(&hub, "signal=mode");
+        other.over_the_state().await;
+        for told in &mut readers {
+            assert_eq!(told.next().await.data["devices"].as_array().unwrap().len(), 1);
+            let state = told.next().await;
+            let known = |id: &&str| [fast, slow].iter().any(|list| list.split(',').any(|one| one == *id));
+            let values = ids(&state.data["values"]);
+            let unchanging = ["shutdowns", "warnings"];
+            assert!(values.iter().all(|id| known(id) || unchanging.contains(id)), "{query}: {values:?}");
         }
-        registers[8] += hub.table().devices[0].lock().sequence as u16;
-        registers[4] += hub.table().devices[0].lock().sequence as u16;
-        let starts = hub.table().devices[0].lock().sequence as u16;
-        hub.finish(&hub.table().devices[0], answered(all, &[(100, &registers), (126, &[starts, 0])]));
-        for told in [&mut told, &mut told_again] {
-            for (rate, wanted) in rounds {
+        other_round(&hub);
+        for told in &mut readers {
+            for (rate, wanted) in
+                [("fast", fast), ("slow", slow)].into_iter().filter(|(_, wanted)| !wanted.is_empty())
+            {
                 let event = told.next().await;
                 assert_eq!((event.name.as_str(), &event.data["rate"]), ("values", &json!(rate)), "{query}");
-                let changed = ids(&event.data["changed"]);
-                assert!(changed.iter().all(|id| wanted.contains(id)), "{query}: {changed:?}");
+                assert_eq!(ids(&event.data["changed"]).join(","), wanted, "{query}");
+                assert_eq!(event.data["joined"], json!([]));
                 assert!(event.id.is_some());
             }
+            // What the device does is for everybody.
+            assert_eq!(told.next().await.name, "device", "{query}");
         }
+        assert_eq!(ids(&other.next().await.data["changed"]), ["mode"]);
     }
 }
 

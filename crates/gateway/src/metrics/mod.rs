@@ -58,8 +58,9 @@ impl Scrape {
         let mut devices = Vec::with_capacity(table.devices.len());
         for (index, slot) in table.devices.iter().enumerate() {
             let live = slot.lock();
-            devices.push(DeviceSample::of(&live.device));
-            signals.take(index, &live.device);
+            let sample = DeviceSample::of(&live.device);
+            signals.take(index, &live.device, &sample.view);
+            devices.push(sample);
         }
         let wires = table.wires.iter().map(|(id, link)| WireSample::of(id, link)).collect();
         Self { site, devices, signals, wires }

@@ -8,7 +8,7 @@ use busbar_profile::{Profile, SignalKind, Value};
 
 use super::Out;
 use super::devices::DeviceSample;
-use crate::api::types::{Identity, PointValue, Quality};
+use crate::api::types::{DeviceView, Identity, PointValue, Quality};
 use crate::device::Device;
 
 /// The good values of all devices, by signal. Devices are told apart by their place in the scrape.
@@ -32,8 +32,7 @@ enum Sample {
 
 impl SignalSamples {
     /// Takes every good value of a device. What a wrong device says is nothing of this one's.
-    pub(super) fn take(&mut self, index: usize, device: &Device) {
-        let view = device.view();
+    pub(super) fn take(&mut self, index: usize, device: &Device, view: &DeviceView) {
         if view.identity.verdict == Identity::Wrong {
             return;
         }
@@ -49,8 +48,8 @@ impl SignalSamples {
             }
         }
         // The mode may stand in one register or in several bits; the device knows.
-        if let Some(mode) = view.mode.and_then(|mode| mode.canonical) {
-            self.push(index, "mode", |signal| Some(word(signal, Some(&mode))));
+        if let Some(mode) = view.mode.as_ref().and_then(|mode| mode.canonical.as_deref()) {
+            self.push(index, "mode", |signal| Some(word(signal, Some(mode))));
         }
     }
 

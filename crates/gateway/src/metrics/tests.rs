@@ -3,8 +3,12 @@ use std::sync::Arc;
 use busbar_profile::Rate;
 
 use super::*;
+use crate::device::Device;
+use crate::rates::Rates;
+use crate::site::SiteDevice;
 use crate::stop;
-use crate::testing::{answered, hub, refusal, silence, table};
+use crate::table::{Slot, Table};
+use crate::testing::{answered, hub, refusal, silence, site_device, table};
 
 const FAST: [u16; 12] = [5, 1, 40, 0, 2302, 0, 215, 0, 1234, 0, 1, 0];
 
@@ -81,6 +85,40 @@ fn a_device_decides_nothing_about_the_series() {
     let mut unknown = FAST;
     (unknown[0], unknown[10], unknown[11]) = (4_711, 0xFFFF, 0xFFFF);
     assert_eq!(series(&unknown), known);
+}
+
+/// Prints what it takes: `cargo test -p busbar-gateway thousand -- --nocapture`.
+#[test]
+fn a_scrape_of_a_thousand_controllers_copies_and_lets_go() {
+    let profile = busbar_profile::builtin("datakom-d").unwrap();
+    let zeros: Vec<(u16, Vec<u16>)> = profile
+        .wire
+        .readable
+        .iter()
+        .map(|(first, last)| (*first, vec![0; usize::from(last - first) + 1]))
+        .collect();
+    let zeros: Vec<(u16, &[u16])> = zeros.iter().map(|(at, registers)| (*at, registers.as_slice())).collect();
+    let slot = |index: usize| {
+        let site = SiteDevice { profile, ..site_device(&format!("gen{index}")) };
+        Arc::new(Slot::new(Device::new(site, "w1".to_owned())))
+    };
+    let hub = Hub::new(Table { devices: (0..1_000).map(slot).collect(), ..table(&[]) }, stop::channel().1);
+    let rates = Rates::from_iter([Rate::Fast, Rate::Slow, Rate::Once]);
+    for slot in &hub.table().devices {
+        hub.finish(slot, answered(rates, &zeros));
+    }
+    let begun = std::time::Instant::now();
+    let scrape = Scrape::of(&hub);
+    let copied = begun.elapsed();
+    // From here on every device may be locked by whoever likes.
+    let table = hub.table();
+    let _locked: Vec<_> = table.devices.iter().map(|slot| slot.lock()).collect();
+    let mut registry = Registry::with_prefix(PREFIX);
+    registry.register_collector(Box::new(scrape));
+    let mut text = String::new();
+    text::encode(&mut text, &registry).unwrap();
+    println!("1,000 D-500: copied in {copied:?}, {} bytes in {:?}", text.len(), begun.elapsed());
+    assert_eq!(text.lines().filter(|line| line.starts_with("busbar_genset_frequency_hz{")).count(), 1_000);
 }
 
 #[test]

@@ -151,7 +151,8 @@ async fn a_picture_is_read_while_somebody_looks_and_no_longer() {
     let bench = Bench::new(Duration::from_secs(3600), Duration::ZERO).await;
     bench.until(|| bench.slot.lock().device.is_online()).await;
     assert!(!bench.reads().iter().any(is_demand), "nobody looks");
-    assert!(!bench.slot.lock().device.values().iter().any(|value| value.id == "lcd"));
+    let lcd = bench.slot.lock().device.site().profile.point_index("lcd").unwrap();
+    assert!(!bench.slot.lock().device.shows(lcd));
 
     // Though the next fast round is an hour away.
     let look = bench.look("display");

@@ -4,6 +4,7 @@ mod guard;
 mod held;
 mod limits;
 mod places;
+mod refusal;
 
 use std::net::SocketAddr;
 use std::pin::pin;
@@ -24,6 +25,7 @@ use tower_http::compression::CompressionLayer;
 use self::guard::{Known, header_unless_set};
 pub use self::limits::Limits;
 use self::places::{Activity, Places};
+use self::refusal::Worded;
 use crate::api;
 use crate::hub::Hub;
 use crate::page;
@@ -116,7 +118,7 @@ async fn connection(
         let answer = hyper::service::Service::call(&router, request);
         async move { answer.await.map(|response| held::holding(response, answering)) }
     });
-    let mut connection = pin!(server.serve_connection(TokioIo::new(stream), service));
+    let mut connection = pin!(server.serve_connection(TokioIo::new(Worded::new(stream)), service));
     let stopped = tokio::select! {
         result = connection.as_mut() => {
             if let Err(error) = result {
@@ -134,14 +136,18 @@ async fn connection(
 
 /// Everything that is served.
 fn router(hub: Arc<Hub>, known: Known, limits: &Limits) -> Router {
+    let waiting = guard::waiting(limits);
+    let document = page::document(Arc::clone(&hub))
+        .layer(from_fn_with_state(Arc::clone(&waiting), guard::weighed))
+        .layer(CompressionLayer::new());
     let api = api::router(hub)
         .layer(from_fn(api::tagged))
-        .layer(from_fn_with_state(guard::waiting(limits), guard::weighed))
+        .layer(from_fn_with_state(waiting, guard::weighed))
         .layer(CompressionLayer::new())
         .layer(from_fn_with_state(guard::streams(limits), guard::counted))
         .layer(header_unless_set(header::CACHE_CONTROL, "no-store"))
         .layer(header_unless_set(header::VARY, "accept-encoding"));
-    guard::guarded(Router::new().merge(api).merge(page::router()), known)
+    guard::guarded(Router::new().merge(api).merge(document).merge(page::files()), known)
 }
 
 #[cfg(test)]

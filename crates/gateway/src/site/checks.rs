@@ -1,4 +1,5 @@
-//! What only shows when wires and devices are seen together: serial settings, crowded lines, doubtful unit ids.
+//! What only shows when wires and devices are seen together: serial settings, crowded lines, doubtful unit ids, idle
+//! wires.
 
 use std::fmt::Display;
 use std::ops::Range;
@@ -6,22 +7,9 @@ use std::ops::Range;
 use busbar_link::{Endpoint, Parity, StopBits};
 use busbar_profile::{Collector, SerialSettings};
 
+use super::devices::{Devices, PlacedDevice};
+use super::wires::{PlacedWire, Wires};
 use super::{SiteDevice, SiteWire};
-
-/// A wire and where its endpoint stands in the text.
-pub(super) struct PlacedWire {
-    pub(super) id: String,
-    /// None when its endpoint is wrong.
-    pub(super) wire: Option<SiteWire>,
-    pub(super) endpoint: Range<usize>,
-}
-
-/// A device and where the text names its wire and its unit id.
-pub(super) struct PlacedDevice {
-    pub(super) device: SiteDevice,
-    pub(super) wire: Range<usize>,
-    pub(super) unit: Range<usize>,
-}
 
 /// SmartGen units that one RS-485 line carries.
 const SMARTGEN_UNITS: usize = 32;
@@ -29,16 +17,28 @@ const SMARTGEN_UNITS: usize = 32;
 /// Controllers whose manual lets a unit id be set that its own tables of frames do not reach: the highest that they do.
 const REACHED_UNITS: &[(&str, u8)] = &[("datakom-dkg705", 144)];
 
+/// A wire and the devices on it.
+pub(super) struct OnWire<'a> {
+    pub(super) wire: &'a PlacedWire,
+    pub(super) devices: Vec<&'a PlacedDevice>,
+}
+
+/// Every wire with its devices, in the order of the file.
+pub(super) fn on_wires<'a>(wires: &'a [PlacedWire], devices: &'a [PlacedDevice]) -> Vec<OnWire<'a>> {
+    let mut on_wires: Vec<OnWire<'_>> =
+        wires.iter().map(|wire| OnWire { wire, devices: Vec::new() }).collect();
+    for placed in devices {
+        on_wires[placed.device.wire].devices.push(placed);
+    }
+    on_wires
+}
+
 /// Settings of a line that a device on it cannot be set to. Behind a converter the line is not ours to set.
-pub(super) fn serial(wires: &[PlacedWire], devices: &[PlacedDevice], findings: &mut Collector<'_>) {
-    for (index, wire) in wires.iter().enumerate() {
+pub(super) fn serial(wires: &[OnWire<'_>], findings: &mut Collector<'_>) {
+    for OnWire { wire, devices } in wires {
         let Some(SiteWire { endpoint: Endpoint::Rtu { serial, .. }, .. }) = &wire.wire else { continue };
         let line = Line {
-            devices: devices
-                .iter()
-                .map(|placed| &placed.device)
-                .filter(|device| device.wire == index)
-                .collect(),
+            devices: devices.iter().map(|placed| &placed.device).collect(),
             endpoint: wire.endpoint.clone(),
         };
         let baud = Setting { key: "baud", value: serial.baud, words: format!("{} baud", serial.baud) };
@@ -106,22 +106,41 @@ impl Line<'_> {
 }
 
 /// Lines with more SmartGen units than their drivers are made for.
-pub(super) fn crowded(wires: &[PlacedWire], devices: &[PlacedDevice], warnings: &mut Collector<'_>) {
-    for (index, wire) in wires.iter().enumerate() {
-        let on_it = devices.iter().filter(|placed| placed.device.wire == index);
-        let smartgen: Vec<&PlacedDevice> =
-            on_it.filter(|placed| placed.device.profile.vendor == "SmartGen").collect();
+pub(super) fn crowded(wires: &[OnWire<'_>], warnings: &mut Collector<'_>) {
+    for OnWire { wire, devices } in wires {
+        let smartgen: Vec<&&PlacedDevice> =
+            devices.iter().filter(|placed| placed.device.profile.vendor == "SmartGen").collect();
         if let Some(first_too_many) = smartgen.get(SMARTGEN_UNITS) {
             warnings.add(
                 first_too_many.wire.clone(),
                 format!(
                     "{} SmartGen units are on the wire `{}`, and one RS-485 line carries {SMARTGEN_UNITS}",
                     smartgen.len(),
-                    wire.id
+                    wire.id.value
                 ),
                 "give the others a line of their own, or put a repeater between",
             );
         }
+    }
+}
+
+/// Wires without a device, and a site without any.
+pub(super) fn idle(wires: &Wires, devices: &Devices, warnings: &mut Collector<'_>) {
+    if devices.placed.is_empty() {
+        warnings.add(
+            0..0,
+            "no device is in this file, so there is nothing to show",
+            "add [[wires]] and [[devices]]",
+        );
+        return;
+    }
+    let idle = wires.placed.iter().enumerate().filter(|(index, _)| !devices.wires.contains(index));
+    for (_, wire) in idle {
+        warnings.add(
+            wire.id.span.clone(),
+            format!("no device is on the wire `{}`", wire.id.value),
+            "put one on it, or leave the wire out",
+        );
     }
 }
 

@@ -3,6 +3,7 @@
 use busbar_profile::Collector;
 
 use super::reader::Table;
+use super::words::shown;
 
 /// The names in lower case.
 pub(super) fn read(server: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<String> {
@@ -12,7 +13,7 @@ pub(super) fn read(server: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<
         if !is_host(&text.value) {
             findings.add(
                 text.span,
-                format!("`{}` is no host name", text.value.escape_debug()),
+                format!("`{}` is no host name", shown(&text.value)),
                 "write a name as a browser's address line has it, without scheme, port and path, such as \
                  \"power.example.org\"",
             );

@@ -1,17 +1,26 @@
 //! Reads typed keys out of parsed TOML and notes every mistake with its place, instead of stopping at the first.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
 use busbar_profile::Collector;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::words::{meant, shown};
+
 /// A value and where it stands in the text.
 #[derive(Debug, Clone)]
 pub(super) struct At<T> {
     pub(super) value: T,
     pub(super) span: Range<usize>,
+}
+
+/// What a number may be.
+pub(super) struct Limits {
+    pub(super) range: RangeInclusive<f64>,
+    /// The same for people.
+    pub(super) words: &'static str,
 }
 
 /// One table of the file; asking it for a key that is not declared in `keys` is a bug of the caller.
@@ -35,14 +44,19 @@ impl<'t, 'i> Table<'t, 'i> {
         for key in table.keys() {
             let word = key.get_ref().as_ref();
             if !keys.contains(&word) {
-                let remedy = match keys.iter().find(|known| alike(known, word)) {
+                let known = keys.iter().copied();
+                let remedy = match meant(word, known.clone()) {
                     Some(known) => format!("did you mean `{known}`?"),
-                    None => format!("write one of: {}", keys.join(", ")),
+                    None => format!("write one of: {}", known.collect::<Vec<_>>().join(", ")),
                 };
-                findings.add(key.span(), format!("unknown key `{word}` in {name}"), remedy);
+                findings.add(key.span(), format!("unknown key `{}` in {name}", shown(word)), remedy);
             }
         }
         Self { name, table, span }
+    }
+
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
     }
 
     /// The value of a key, or a report that it is missing, with what to add.
@@ -53,7 +67,7 @@ impl<'t, 'i> Table<'t, 'i> {
         findings: &mut Collector<'_>,
         read: impl FnOnce(&Self, &str, &mut Collector<'_>) -> Option<T>,
     ) -> Option<T> {
-        if !self.table.contains_key(key) {
+        if !self.has(key) {
             findings.add(
                 self.span.clone(),
                 format!("`{key}` is missing in {}", self.name),
@@ -105,11 +119,33 @@ impl<'t, 'i> Table<'t, 'i> {
         value.get_ref().as_bool().or_else(|| wrong_type(key, value, "true or false without quotes", findings))
     }
 
+    /// A number within `limits`, with or without a fraction.
+    pub(super) fn number(&self, key: &str, limits: &Limits, findings: &mut Collector<'_>) -> Option<At<f64>> {
+        let value = self.value(key)?;
+        let (text, number) = match value.get_ref() {
+            DeValue::Float(float) => (float.as_str(), float.as_str().parse().ok()),
+            DeValue::Integer(integer) => {
+                let whole = i64::from_str_radix(integer.as_str(), integer.radix()).ok();
+                (integer.as_str(), whole.map(|whole| whole as f64))
+            }
+            _ => return wrong_type(key, value, "a number without quotes", findings),
+        };
+        let Some(number) = number.filter(|number| limits.range.contains(number)) else {
+            findings.add(
+                value.span(),
+                format!("`{key}` is {}", shown(text)),
+                format!("write a number {}", limits.words),
+            );
+            return None;
+        };
+        Some(At { value: number, span: value.span() })
+    }
+
     /// A duration within `limits`.
     pub(super) fn duration(
         &self,
         key: &str,
-        limits: std::ops::RangeInclusive<Duration>,
+        limits: RangeInclusive<Duration>,
         findings: &mut Collector<'_>,
     ) -> Option<At<Duration>> {
         const HELP: &str = "write a number and ms, s, min or h, such as \"500ms\" or \"10s\"";
@@ -118,7 +154,7 @@ impl<'t, 'i> Table<'t, 'i> {
             return wrong_type(key, value, "a duration in quotes, such as \"1s\"", findings);
         };
         let Some(duration) = parse_duration(text) else {
-            findings.add(value.span(), format!("`{text}` is no duration"), HELP);
+            findings.add(value.span(), format!("`{}` is no duration", shown(text)), HELP);
             return None;
         };
         if !limits.contains(&duration) {
@@ -202,26 +238,13 @@ fn parse_duration(text: &str) -> Option<Duration> {
     number.checked_mul(milliseconds).map(Duration::from_millis)
 }
 
-fn in_words(duration: Duration) -> String {
+pub(super) fn in_words(duration: Duration) -> String {
     match duration.as_millis() {
         0 => "0s".to_owned(),
         ms if ms % 3_600_000 == 0 => format!("{}h", ms / 3_600_000),
         ms if ms % 60_000 == 0 => format!("{}min", ms / 60_000),
         ms if ms % 1_000 == 0 => format!("{}s", ms / 1_000),
         ms => format!("{ms}ms"),
-    }
-}
-
-/// Whether two words differ by one slip: a letter too many, too few, changed, or two swapped.
-fn alike(known: &str, word: &str) -> bool {
-    let (a, b): (Vec<char>, Vec<char>) = (known.chars().collect(), word.chars().collect());
-    let same_start = a.iter().zip(&b).take_while(|(a, b)| a == b).count();
-    let (a, b) = (&a[same_start..], &b[same_start..]);
-    let same_end = a.iter().rev().zip(b.iter().rev()).take_while(|(a, b)| a == b).count();
-    match (&a[..a.len() - same_end], &b[..b.len() - same_end]) {
-        ([_] | [], [_] | []) => true,
-        ([a1, a2], [b1, b2]) => a1 == b2 && a2 == b1,
-        _ => false,
     }
 }
 
@@ -251,16 +274,5 @@ mod tests {
         assert_eq!(in_words(Duration::from_millis(1_500)), "1500ms");
         assert_eq!(in_words(Duration::from_secs(60)), "1min");
         assert_eq!(in_words(Duration::ZERO), "0s");
-    }
-
-    #[test]
-    fn slips_are_recognised() {
-        for (word, known) in
-            [("unti", "unit"), ("uni", "unit"), ("unitt", "unit"), ("unat", "unit"), ("profil", "profile")]
-        {
-            assert!(alike(known, word), "{word}");
-        }
-        assert!(!alike("unit", "name"));
-        assert!(!alike("wire", "endpoint"));
     }
 }

@@ -1,4 +1,15 @@
+use super::checks::OnWire;
+use super::devices::PlacedDevice;
+use super::reader::At;
+use super::wires::PlacedWire;
 use super::*;
+
+mod diagram;
+mod documents;
+mod large;
+mod limits;
+mod mistakes;
+mod names;
 
 const WHOLE: &str = r#"
 [site]
@@ -55,6 +66,12 @@ fn device_with(key: &str, line: &str) -> String {
     ))
 }
 
+/// The warnings of a file without a mistake.
+fn warned(text: &str) -> Vec<String> {
+    let site = Site::parse("site.toml", text).unwrap_or_else(|findings| panic!("{findings}\n{text}"));
+    site.warnings.iter().map(ToString::to_string).collect()
+}
+
 fn mistakes(text: &str) -> Vec<String> {
     match Site::parse("site.toml", text) {
         Ok(site) => panic!("accepted: {site:?}"),
@@ -70,13 +87,19 @@ fn a_whole_site_file() {
     assert_eq!(site.wires[0].timeout, Some(Duration::from_millis(500)));
     assert_eq!((site.wires[1].timeout, site.wires[0].spacing), (None, None));
     assert_eq!(site.wires[1].spacing, Some(Duration::from_millis(20)));
-    assert!(site.warnings.is_empty());
+    assert_eq!(
+        site.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        ["site.toml:19:6: no device is on the wire `converter`; put one on it, or leave the wire out"]
+    );
+    assert_eq!((site.time_zone.as_deref(), &site.diagram), (None, &Diagram::default()));
+    assert!(!site.wires[0].trace);
     let [first, second] = site.devices.as_slice() else { panic!("two devices") };
     assert_eq!((first.name.as_str(), first.wire, first.unit), ("Genset 1", 0, 1));
     assert_eq!(first.word_order, WordOrder::HighFirst);
     assert_eq!(first.poll, Poll { fast: Duration::from_millis(500), slow: Duration::from_secs(60) });
     assert_eq!((second.name.as_str(), second.wire, second.unit), ("gen-2", 1, 16));
     assert_eq!((second.word_order, second.poll), (WordOrder::LowFirst, Poll::default()));
+    assert_eq!((&first.model, &first.desired_mode, first.nameplate), (&None, &None, Nameplate::default()));
 }
 
 #[test]
@@ -84,174 +107,16 @@ fn the_least_site_listens_on_this_machine_only() {
     let site = Site::parse("site.toml", &with("")).unwrap();
     assert_eq!(site.listen.to_string(), "127.0.0.1:8080");
     assert!(site.wires.is_empty() && site.devices.is_empty());
+    let nothing = "site.toml:1:1: no device is in this file, so there is nothing to show; add [[wires]] and [[devices]]";
+    assert_eq!(warned(&with("")), [nothing]);
+    // Wires without devices are not told again one by one.
+    assert_eq!(warned(&with("[[wires]]\nid = \"w\"\nendpoint = \"tcp://h\"")), [nothing]);
 }
 
 #[test]
 fn a_fast_rate_slower_than_the_usual_slow_one_takes_it_along() {
     let site = Site::parse("site.toml", &device_with("poll", "poll = { fast = \"30s\" }")).unwrap();
     assert_eq!(site.devices[0].poll.slow, Duration::from_secs(30));
-}
-
-#[test]
-fn every_mistake_has_its_place_and_remedy() {
-    for (text, expected) in [
-        ("", "site.toml:1:1: `site` is missing in a site file; add `site = { name = \"North hospital\" }`"),
-        ("[site]\n", "site.toml:1:1: `name` is missing in [site]; add `name = \"North hospital\"`"),
-        ("site = 1", "site.toml:1:8: `site` has the wrong type (integer); write a table"),
-        ("[site]\nname = 5", "site.toml:2:8: `name` has the wrong type (integer); write a text in quotes"),
-        (
-            "[site]\nname = \" \"",
-            "site.toml:2:8: this cannot be a name; write 1 to 200 characters on one line",
-        ),
-        (
-            "[site]\nname = \"a\\nb\"",
-            "site.toml:2:8: this cannot be a name; write 1 to 200 characters on one line",
-        ),
-        (
-            "[site]\nname = \"S\"\nnmae = \"T\"",
-            "site.toml:3:1: unknown key `nmae` in [site]; did you mean `name`?",
-        ),
-        (
-            &with("[[devies]]\nid = 1"),
-            "site.toml:2:3: unknown key `devies` in a site file; did you mean `devices`?",
-        ),
-        (
-            &with("colour = \"red\""),
-            "site.toml:2:1: unknown key `colour` in a site file; write one of: site, server, wires, devices",
-        ),
-        (
-            &with("server.listen = \"8080\""),
-            "site.toml:2:17: `8080` is no address to listen on; write an IP address, a colon and a port, such as \
-             \"127.0.0.1:8080\" for this machine only or \"0.0.0.0:8080\" for the network",
-        ),
-        (
-            &with("wires = \"w\""),
-            "site.toml:2:9: `wires` has the wrong type (string); write a list of tables, each headed [[wires]]",
-        ),
-        (
-            &with("[[wires]]\nid = \"w\""),
-            "site.toml:2:1: `endpoint` is missing in [[wires]]; add `endpoint = \"tcp://192.0.2.20:502\"`",
-        ),
-        (
-            &with("[[wires]]\nid = \"w\"\nendpoint = \"10.0.0.1:502\""),
-            "site.toml:4:12: `10.0.0.1:502` is no endpoint: no scheme; write tcp://10.0.0.1:502 or",
-        ),
-        (
-            &with("[[wires]]\nid = \"w 1\"\nendpoint = \"tcp://h\""),
-            "site.toml:3:6: `w 1` cannot be an id; write 1 to 64 letters a-z, digits, - and _; `name` takes any text",
-        ),
-        (
-            &with("[[wires]]\nid = \"w\"\nendpoint = \"tcp://h\"\ntimeout = \"1\""),
-            "site.toml:5:11: `1` is no duration; write a number and ms, s, min or h, such as \"500ms\" or \"10s\"",
-        ),
-        (
-            &with("[[wires]]\nid = \"w\"\nendpoint = \"tcp://h\"\ntimeout = \"0s\""),
-            "site.toml:5:11: `timeout` is 0s; write a duration from 10ms to 1min",
-        ),
-        (
-            &with(
-                "[[wires]]\nid = \"w\"\nendpoint = \"tcp://h\"\n[[wires]]\nid = \"w\"\nendpoint = \"tcp://i\"",
-            ),
-            "site.toml:6:6: there is a wire `w` already; give every wire an id of its own",
-        ),
-        (
-            &with("[[wires]]\nid = \"w\"\nendpoint = \"tcp://h:0\""),
-            "site.toml:4:12: `tcp://h:0` cannot be connected to: nothing listens on port 0; write the port of the device",
-        ),
-        (
-            &with("[[wires]]\nid = \"w\"\nendpoint = \"tls://h\""),
-            "site.toml:4:12: `tls://h:802` cannot be spoken: this version has no TLS; write a tcp:// endpoint;",
-        ),
-        (
-            &with("[[wires]]\nid = \"w\"\nendpoint = \"rtu://pty\""),
-            "site.toml:4:12: `rtu://pty?baud=9600&parity=none&stop=1` cannot be connected to: `pty` is no serial device; \
-             write the device that the imitation printed, such as \"rtu:///dev/pts/3\"",
-        ),
-        (
-            &with("[[wires]]\nid = \"w\"\nendpoint = \"tcp://h\"\nspacing = \"11s\""),
-            "site.toml:5:11: `spacing` is 11s; write a duration from 0s to 10s",
-        ),
-        (
-            &with(
-                "[[wires]]\nid = \"w\"\nendpoint = \"tcp://h\"\n[[wires]]\nid = \"x\"\nendpoint = \"tcp://H:502\"",
-            ),
-            "site.toml:7:12: `tcp://H:502` is the endpoint of the wire `w` already; put all devices",
-        ),
-        (
-            &with(
-                "[[wires]]\nid = \"w\"\nendpoint = \"rtu:///dev/a?baud=9600\"\n[[wires]]\nid = \"x\"\nendpoint = \"rtu:///dev/a?baud=19200\"",
-            ),
-            "site.toml:7:12: `rtu:///dev/a?baud=19200",
-        ),
-        (
-            &device_with("profile", "profile = \"datakom-x\""),
-            "site.toml:7:11: there is no profile `datakom-x`; write one of: datakom-d",
-        ),
-        (
-            &device_with("wire", "wire = \"x\""),
-            "site.toml:8:8: the wire `x` is not defined; write one of: w; or define it with [[wires]]",
-        ),
-        (
-            &with("[[devices]]\nid = \"g\"\nprofile = \"datakom-d\"\nwire = \"w\"\nunit = 1"),
-            "site.toml:5:8: the wire `w` is not defined; define it: [[wires]] with id = \"w\" and its endpoint",
-        ),
-        (
-            &device_with("unit", "unit = 0"),
-            "site.toml:9:8: datakom-d knows no unit 0; write a number from 1 to 240",
-        ),
-        (
-            &device_with("unit", "unit = 241"),
-            "site.toml:9:8: datakom-d knows no unit 241; write a number from 1 to 240",
-        ),
-        (
-            &device_with("unit", "unit = 99999999999999999999"),
-            "site.toml:9:8: `unit` is too large; write a smaller number",
-        ),
-        (
-            &device_with("unit", "unit = \"1\""),
-            "site.toml:9:8: `unit` has the wrong type (string); write a whole number without quotes",
-        ),
-        (&device_with("unit", ""), "site.toml:5:1: `unit` is missing in [[devices]]; add `unit = 1`"),
-        (
-            &device_with("word_order", "word_order = \"big\""),
-            "site.toml:10:14: `big` is no word order; write \"low-first\" or \"high-first\"",
-        ),
-        (
-            &device_with("poll", "poll = \"1s\""),
-            "site.toml:10:8: `poll` has the wrong type (string); write a table",
-        ),
-        (
-            &device_with("poll", "poll = { fst = \"1s\" }"),
-            "site.toml:10:10: unknown key `fst` in poll; did you mean `fast`?",
-        ),
-        (
-            &device_with("poll", "poll = { fast = 1 }"),
-            "site.toml:10:17: `fast` has the wrong type (integer); write a duration in quotes, such as \"1s\"",
-        ),
-        (
-            &device_with("poll", "poll = { fast = \"2s\", slow = \"1s\" }"),
-            "site.toml:10:30: `slow` is shorter than `fast`; make `slow` at least as long as `fast`",
-        ),
-        (
-            &format!(
-                "{}[[devices]]\nid = \"h\"\nprofile = \"datakom-d\"\nwire = \"w\"\nunit = 1",
-                device_with("", "")
-            ),
-            "site.toml:14:8: unit 1 on wire w is g already; give every device on a wire a unit id of its own",
-        ),
-        (
-            &format!(
-                "{}[[devices]]\nid = \"g\"\nprofile = \"datakom-d\"\nwire = \"w\"\nunit = 2",
-                device_with("", "")
-            ),
-            "site.toml:11:6: there is a device `g` already; give every device an id of its own",
-        ),
-        ("[site]\nname = \"S", "site.toml:2:10: this is not TOML: invalid basic string"),
-    ] {
-        let found = mistakes(text);
-        assert_eq!(found.len(), 1, "{text}\n{found:#?}");
-        assert!(found[0].starts_with(expected), "{text}\nexpected {expected}\nfound    {}", found[0]);
-    }
 }
 
 #[test]
@@ -263,6 +128,21 @@ fn all_mistakes_are_told_at_once() {
     let found = mistakes(&text);
     let lines: Vec<&str> = found.iter().map(|line| line.split(':').nth(1).unwrap()).collect();
     assert_eq!(lines, ["6", "25", "26", "35"], "{found:#?}");
+}
+
+#[test]
+fn what_the_file_wants_of_a_device_and_says_of_its_machine() {
+    let more = "model = \"D-545\"\ndesired_mode = \"test\"\nnameplate_kw = 400\ntank_litres = 900.5\nbattery_volts = 0x18";
+    let text = device_with("more", more)
+        .replace("site.name = \"S\"", "site = { name = \"S\", time_zone = \"europe/berlin\" }")
+        .replace("endpoint = \"tcp://h\"", "endpoint = \"tcp://h\"\ntrace = true");
+    let site = Site::parse("site.toml", &text).unwrap();
+    assert_eq!((site.time_zone.as_deref(), site.wires[0].trace), (Some("Europe/Berlin"), true));
+    let device = &site.devices[0];
+    assert_eq!((device.model.as_deref(), device.desired_mode.as_deref()), (Some("D-545"), Some("test")));
+    let plates = Nameplate { power_kw: Some(400.0), tank_l: Some(900.5), battery_v: Some(24.0) };
+    assert_eq!(device.nameplate, plates);
+    assert!(site.warnings.is_empty(), "{:?}", site.warnings);
 }
 
 #[test]
@@ -290,7 +170,8 @@ fn a_line_is_set_as_every_device_on_it_can_be() {
             "rtu:///dev/a?baud=19200",
             &[dkg][..],
             &[
-                "d1 (datakom-dkg705) cannot be set to 19200 baud; write baud=9600, and set every device on the line to it",
+                "d1 (datakom-dkg705) cannot be set to 19200 baud; write baud=9600, and set every device on the line \
+                 to it",
             ][..],
         ),
         (
@@ -307,8 +188,10 @@ fn a_line_is_set_as_every_device_on_it_can_be() {
             &[
                 "d1 (smartgen-hat821si) and d2 (datakom-dkg705) cannot be set to 1200 baud; write baud=9600, and set every \
                  device on the line to it",
-                "d2 (datakom-dkg705) cannot be set to even parity; write parity=none, and set every device on the line to it",
-                "d2 (datakom-dkg705) cannot be set to 2 stop bits; write stop=1, and set every device on the line to it",
+                "d2 (datakom-dkg705) cannot be set to even parity; write parity=none, and set every device on the \
+                 line to it",
+                "d2 (datakom-dkg705) cannot be set to 2 stop bits; write stop=1, and set every device on the line \
+                 to it",
             ],
         ),
     ] {
@@ -335,9 +218,11 @@ fn devices_that_have_no_setting_in_common_need_wires_of_their_own() {
     fast.wire.serial.baud = vec![38_400];
     let place = |device: SiteDevice| PlacedDevice { device, wire: 0..0, unit: 0..0 };
     let fast = SiteDevice { profile: Box::leak(Box::new(fast)), ..site.devices[1].clone() };
-    let wires = [PlacedWire { id: "w".to_owned(), wire: Some(site.wires[0].clone()), endpoint: 0..0 }];
+    let id = At { value: "w".to_owned(), span: 0..0 };
+    let wire = PlacedWire { id, wire: Some(site.wires[0].clone()), endpoint: 0..0 };
+    let devices = [place(site.devices[0].clone()), place(fast)];
     let mut findings = Collector::new("site.toml", &text);
-    checks::serial(&wires, &[place(site.devices[0].clone()), place(fast)], &mut findings);
+    checks::serial(&[OnWire { wire: &wire, devices: devices.iter().collect() }], &mut findings);
     assert!(
         findings
             .finish()
@@ -350,10 +235,6 @@ fn devices_that_have_no_setting_in_common_need_wires_of_their_own() {
 #[test]
 fn what_deserves_a_look_is_no_mistake() {
     let smartgen = |count| vec!["smartgen-acc1700"; count];
-    let warned = |text: &str| {
-        let site = Site::parse("site.toml", text).unwrap();
-        site.warnings.iter().map(ToString::to_string).collect::<Vec<_>>()
-    };
     assert_eq!(warned(&line("rtu:///dev/a", &smartgen(32))), [""; 0]);
     assert_eq!(
         warned(&line("rtu:///dev/a", &smartgen(34))),
@@ -373,15 +254,4 @@ fn what_deserves_a_look_is_no_mistake() {
     );
     let found = mistakes(&dkg(251));
     assert_eq!(found, ["site.toml:9:8: datakom-dkg705 knows no unit 251; write a number from 1 to 250"]);
-}
-
-#[test]
-fn the_sample_is_sound() {
-    let sample = include_str!("../../../../examples/site.toml");
-    let site = Site::parse("examples/site.toml", sample).unwrap_or_else(|findings| panic!("{findings}"));
-    assert!(site.warnings.is_empty(), "{:?}", site.warnings);
-    let on_the_line = site.devices.iter().filter(|device| site.wires[device.wire].id == "line");
-    assert_eq!((on_the_line.count(), site.devices.len()), (3, 4));
-    let schemes: Vec<&str> = site.wires.iter().map(|wire| wire.endpoint.scheme()).collect();
-    assert_eq!(schemes, ["tcp", "rtu"]);
 }

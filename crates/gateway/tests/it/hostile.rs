@@ -124,12 +124,13 @@ async fn a_body_that_nobody_asked_for_is_not_waited_for() {
 async fn heads_that_are_too_large_are_refused() {
     let bench = ready().await;
     let field = format!("GET / HTTP/1.1\r\nhost: localhost\r\nx: {}\r\n\r\n", "a".repeat(1_000_000));
-    let many: String = (0..1_000).map(|i| format!("x{i}: 1\r\n")).collect();
+    let many: String = (0..150).map(|i| format!("x{i}: 1\r\n")).collect();
     let many = format!("GET / HTTP/1.1\r\nhost: localhost\r\n{many}\r\n");
-    for head in [field, many] {
-        let answer = answer(&bench, &head).await;
-        // What is closed while much is on its way may be lost on the way back.
-        assert!(answer.is_empty() || status(&answer) == 431, "{answer}");
+    is_problem(&answer(&bench, &many).await, 431);
+    let large = answer(&bench, &field).await;
+    // What is refused while much is on its way may be lost on the way back.
+    if !large.is_empty() {
+        is_problem(&large, 431);
     }
     is_problem(&answer(&bench, request(&format!("GET /{}", "a".repeat(10_000)))).await, 414);
     let long = answer(&bench, request(&format!("GET /{}", "a".repeat(100_000)))).await;
@@ -233,7 +234,9 @@ async fn what_is_no_http_is_no_request() {
         (framed("transfer-encoding: chunked", "FFFFFFFFFFFFFFFFFF\r\n"), &[400, 405]),
     ] {
         let answer = answer(&bench, &bytes).await;
-        assert!(expected.contains(&status(&answer)), "{bytes:?}: {answer}");
+        let code = status(&answer);
+        assert!(expected.contains(&code), "{bytes:?}: {answer}");
+        is_problem(&answer, code);
     }
     // The preface of HTTP/2 without agreement: no answer of ours would be understood.
     let answer = answer(&bench, "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n").await;

@@ -11,6 +11,7 @@ mod http;
 mod identity;
 mod live;
 mod openapi;
+mod readers;
 mod reload;
 mod sharing;
 mod start;

@@ -1,7 +1,9 @@
 //! A real HTTP client, and one that reads server-sent events as the standard says.
 
+use std::io::Write;
 use std::net::SocketAddr;
 
+use flate2::write::GzDecoder;
 use http_body_util::{BodyExt, Empty};
 use hyper::body::{Bytes, Incoming};
 use hyper::client::conn::http1;
@@ -79,10 +81,19 @@ impl Client {
 
     /// The event stream.
     pub(crate) async fn events(&self, query: &str) -> Stream {
-        let response = self.send("GET", &format!("/api/v1/events{query}"), &[]).await;
+        self.events_with(query, &[]).await
+    }
+
+    /// The same with headers; compressed if they ask for it.
+    pub(crate) async fn events_with(&self, query: &str, headers: &[(&str, &str)]) -> Stream {
+        let response = self.send("GET", &format!("/api/v1/events{query}"), headers).await;
         assert_eq!(response.status(), StatusCode::OK);
         assert_eq!(response.headers()["content-type"], "text/event-stream");
-        Stream { body: response.into_body(), text: String::new() }
+        let encodings: Vec<_> = response.headers().get_all("content-encoding").iter().collect();
+        let packed = encodings == ["gzip"];
+        assert!(packed || encodings.is_empty(), "once at most: {encodings:?}");
+        let unpack = packed.then(|| GzDecoder::new(Vec::new()));
+        Stream { body: response.into_body(), unpack, text: String::new() }
     }
 
     /// A connection that asks for the event stream and never reads a byte of it.
@@ -128,6 +139,7 @@ impl Client {
 /// A reader of the event stream.
 pub(crate) struct Stream {
     body: Incoming,
+    unpack: Option<GzDecoder<Vec<u8>>>,
     text: String,
 }
 
@@ -136,6 +148,7 @@ pub(crate) struct Stream {
 pub(crate) struct Event {
     pub(crate) name: String,
     pub(crate) data: Value,
+    pub(crate) id: Option<String>,
 }
 
 impl Stream {
@@ -152,8 +165,23 @@ impl Stream {
             }
             let frame = timeout(PATIENCE, self.body.frame()).await.expect("an event in time")?;
             let data = frame.ok()?.into_data().unwrap();
+            let data = self.unpacked(&data);
             self.text.push_str(std::str::from_utf8(&data).unwrap());
         }
+    }
+
+    /// What can be read of what came: all of it, or the sender held something back.
+    fn unpacked(&mut self, data: &[u8]) -> Vec<u8> {
+        let Some(unpack) = &mut self.unpack else { return data.to_vec() };
+        unpack.write_all(data).unwrap();
+        unpack.flush().unwrap();
+        std::mem::take(unpack.get_mut())
+    }
+
+    /// Reads to the end; whether the stream was sent to its end, and its checksum is right.
+    pub(crate) async fn ends_well(&mut self) -> bool {
+        while self.next().await.is_some() {}
+        self.unpack.as_mut().is_none_or(|unpack| unpack.try_finish().is_ok())
     }
 
     /// The next event that is as wanted; what comes before it is passed over.
@@ -173,5 +201,9 @@ impl Stream {
 /// An event, or none for a comment.
 fn parse(text: &str) -> Option<Event> {
     let field = |name: &str| text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "));
-    Some(Event { name: field("event")?.to_owned(), data: serde_json::from_str(field("data")?).unwrap() })
+    Some(Event {
+        name: field("event")?.to_owned(),
+        data: serde_json::from_str(field("data")?).unwrap(),
+        id: field("id").map(str::to_owned),
+    })
 }

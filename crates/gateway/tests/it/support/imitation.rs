@@ -28,8 +28,9 @@ pub(crate) struct Behaviour {
     pub(crate) family: Option<&'static str>,
     /// Answers each read after so long.
     pub(crate) delay: Duration,
-    /// Connections so far.
+    /// Connections so far, and those that are open.
     pub(crate) connections: usize,
+    pub(crate) open: usize,
     /// Answers a read of any of these with exception 2.
     pub(crate) unknown: Option<RangeInclusive<u16>>,
     /// Cuts every answer to so many registers.
@@ -108,8 +109,16 @@ async fn serve(listener: TcpListener, behaviour: Arc<Mutex<Behaviour>>) {
     let mut connections = tokio::task::JoinSet::new();
     loop {
         let (stream, _) = listener.accept().await.unwrap();
-        behaviour.lock().unwrap().connections += 1;
-        connections.spawn(connection(stream, Arc::clone(&behaviour)));
+        let behaviour = Arc::clone(&behaviour);
+        {
+            let mut behaviour = behaviour.lock().unwrap();
+            behaviour.connections += 1;
+            behaviour.open += 1;
+        }
+        connections.spawn(async move {
+            connection(stream, Arc::clone(&behaviour)).await;
+            behaviour.lock().unwrap().open -= 1;
+        });
     }
 }
 
