@@ -4,18 +4,23 @@ BUSBAR := target/debug/busbar
 CARGO := cargo
 NPM := npm --prefix web --no-audit --no-fund
 
-.PHONY: demo test bench setup web build lint test-web test-rust test-interop test-page clean
+.PHONY: demo test bench soak setup web build lint test-web test-rust test-interop test-soak test-page clean
 
 ## a whole site on this machine: an imitated controller, the gateway, the page
 demo: build
 	$(BUSBAR) demo
 
 ## every test, with what it needs installed first
-test: setup lint test-web test-rust test-interop test-page
+test: setup lint test-web test-rust test-interop test-soak test-page
 
 ## figures: processor time, beside a bare C echo and other libraries in the same run
 bench: .venv/.installed
 	$(CARGO) run --locked --release -p busbar-bench
+
+## ten minutes of a thousand devices polled each second, then a thousand readers: missed polls, processor, memory
+soak: web
+	$(CARGO) build --locked --release -p busbar -p busbar-bench
+	target/release/busbar-bench soak
 
 setup: web/node_modules/.installed .venv/.installed
 	scripts/setup
@@ -56,6 +61,11 @@ test-rust: web
 
 test-interop: build .venv/.installed
 	.venv/bin/python -m pytest -q tests/interop
+
+# Half a minute of the soak that judges counts only. A tenth of the devices: debug builds of the controllers and the
+# gateway share what may be two slow processors, and a poll that finds no processor is a missed one.
+test-soak: build
+	target/debug/busbar-bench soak --count --devices 100 --seconds 30 --readers 1000
 
 test-page: build
 	$(NPM) run e2e
