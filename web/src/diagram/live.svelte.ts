@@ -11,8 +11,6 @@ interface Carrier {
   bit: number | undefined
 }
 
-const RETRY_MS = 3000
-
 /** By device, then by signal. */
 type Carriers = Readonly<Record<string, ReadonlyMap<string, Carrier>>>
 
@@ -43,20 +41,13 @@ export class SiteLive implements Live {
   }
 
   async #ask(device: string, signals: readonly string[], stop: AbortSignal): Promise<void> {
-    while (!stop.aborted) {
-      try {
-        const path = `devices/${encodeURIComponent(device)}/points?signal=${signals.join(',')}`
-        const { groups } = (await this.#page.get(path, stop)) as PointsView
-        // What is read later is there before anything follows it.
-        for (const point of groups.flatMap(({ points }) => points))
-          this.#page.site.device(device)?.cell(point.id)
-        this.#carriers = { ...this.#carriers, [device]: carriersOf(groups, new Set(signals)) }
-        return
-      } catch {
-        // The page tells about a lost gateway; here it only takes longer.
-        await new Promise((resolve) => setTimeout(resolve, RETRY_MS))
-      }
-    }
+    const path = `devices/${encodeURIComponent(device)}/points?signal=${signals.join(',')}`
+    const points = await this.#page.again(path, stop)
+    if (stop.aborted) return
+    const { groups } = points as PointsView
+    // What is read later is there before anything follows it.
+    for (const point of groups.flatMap(({ points }) => points)) this.#page.site.device(device)?.cell(point.id)
+    this.#carriers = { ...this.#carriers, [device]: carriersOf(groups, new Set(signals)) }
   }
 }
 

@@ -150,8 +150,8 @@ test('the display: being read, then drawn with the time it was read, and what is
   expect(text('[data-point=lcd] header')).toMatch(/^Display read at \d\d:\d\d:\d\d, good, 0 s$/)
   expect(text('[data-point=lcd] details')).toContain('In doubt: pixel order (page 14 of the manual).')
   // A round that changed nothing read it anew.
-  vi.advanceTimersByTime(4000)
-  last().emit('values', { device: 'gen1', rate: 'on_demand', ts: stamp(3), changed: [], joined: [] })
+  vi.advanceTimersByTime(3000)
+  last().emit('values', { device: 'gen1', rate: 'on_demand', ts: stamp(2), changed: [], joined: [] })
   expect(text('[data-point=lcd] header')).toContain('good, 1 s')
 })
 

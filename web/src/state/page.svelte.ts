@@ -105,12 +105,16 @@ export class Page {
     })
   }
 
-  /** Again and again until the points are there or `signal` says stop. */
   async #fetch(device: Device, query: string, signal: AbortSignal, take: (points: PointsView) => void) {
+    const points = await this.again(`devices/${encodeURIComponent(device.view.id)}/points${query}`, signal)
+    if (!signal.aborted) take(points as PointsView)
+  }
+
+  /** What the API has at `path`, asked for again and again until it is there or `signal` says stop. */
+  async again(path: string, signal: AbortSignal): Promise<unknown> {
     while (!signal.aborted) {
       try {
-        const path = `devices/${encodeURIComponent(device.view.id)}/points${query}`
-        return take((await this.get(path, signal)) as PointsView)
+        return await this.get(path, signal)
       } catch {
         // The stream's banner tells about a lost gateway; here it only takes longer.
         await new Promise((resolve) => setTimeout(resolve, RETRY_MS))
