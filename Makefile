@@ -14,8 +14,9 @@ demo: build
 test: setup lint test-web test-rust test-interop test-page
 
 ## figures: processor time, beside a bare C echo and other libraries in the same run
-bench: .venv/.installed
+bench: build .venv/.installed
 	$(CARGO) run --locked --release -p busbar-bench
+	$(NPM) run e2e:slow
 
 setup: web/node_modules/.installed .venv/.installed
 	scripts/setup
