@@ -14,8 +14,9 @@ demo: build
 test: setup lint test-web test-rust test-interop test-soak test-page
 
 ## figures: processor time, beside a bare C echo and other libraries in the same run
-bench: .venv/.installed
+bench: build .venv/.installed
 	$(CARGO) run --locked --release -p busbar-bench
+	$(NPM) run e2e:slow
 
 ## ten minutes of a thousand devices polled each second, then a thousand readers: missed polls, processor, memory
 soak: web

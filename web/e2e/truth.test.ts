@@ -220,7 +220,7 @@ describe('the gateway', () => {
     const good = () => page.locator('[data-point].good').count()
     await expect.poll(good, { timeout: BACK_MS }).toBeGreaterThan(60)
     // It learns how often the gateway speaks.
-    await page.waitForTimeout(3000)
+    await page.waitForTimeout(12_000)
     gateway.freeze()
     const since = Date.now()
     await looks(SILENT_S + 4, since, ({ after, live, lines }) => {

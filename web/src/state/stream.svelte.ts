@@ -10,6 +10,8 @@ const ANSWER_MS = 15_000
 const LONGEST_WAIT_MS = 10_000
 /** So long without a word, before it is known how often the gateway speaks, the stream is opened anew. */
 const SILENCE_MS = 20_000
+/** So long it is listened to before that is known. */
+const LEARNING_MS = 10_000
 /** Silence is more than four of the usual pauses, but never less than this: values may be five seconds old. */
 const PAUSES = 4
 const SILENCE_AT_LEAST_MS = 4000
@@ -34,7 +36,9 @@ export class Stream {
   /** How many devices' states are still to come; undefined before the first word. */
   #missing: number | undefined
   /** The longest pause between two words that was none of the gateway's absences. */
-  #pause: number | undefined
+  #pause = 0
+  /** When it was live for the first time. */
+  #since: number | undefined
 
   /**
    * `open` opens a stream that goes on after the event of that id. With `gone`, which is told that values are not kept
@@ -107,6 +111,7 @@ export class Stream {
     this.#heard()
     if (this.#missing > 0) return
     this.#last = lastEventId || this.#last
+    this.#since ??= Date.now()
     this.#turn('live')
     this.#failures = 0
   }
@@ -115,7 +120,7 @@ export class Stream {
   #heard(): void {
     const now = Date.now()
     if (this.phase === 'live' && this.heardAt !== undefined) {
-      this.#pause = Math.max(this.#pause ?? 0, now - this.heardAt)
+      this.#pause = Math.max(this.#pause, now - this.heardAt)
     }
     this.heardAt = now
     if (this.#missing) this.#after(ANSWER_MS, () => this.#fail())
@@ -132,7 +137,7 @@ export class Stream {
   }
 
   #patience(): number {
-    if (this.#pause === undefined) return SILENCE_MS
+    if (this.#since === undefined || Date.now() - this.#since < LEARNING_MS) return SILENCE_MS
     return Math.min(SILENCE_MS, Math.max(SILENCE_AT_LEAST_MS, PAUSES * this.#pause))
   }
 
