@@ -34,7 +34,7 @@ const MOST_PROCESSOR: f64 = 0.5;
 /// Most memory that the gateway may take, in MiB.
 const MOST_MEMORY: f64 = 100.0;
 /// Most memory that it may take for each reader in addition, in KiB, whether that one reads or not.
-const MOST_EACH: f64 = 128.0;
+const MOST_EACH: f64 = 64.0;
 
 /// Every device answers in this time after the start, on a slow machine too.
 const START: Duration = Duration::from_secs(120);
@@ -219,7 +219,7 @@ async fn crowded(options: &Options, gateway: &Gateway, reader: &Reader) -> Resul
     gateway.memory()?;
     let (began, before, start) = (Timestamp::now(), gateway.processor_time()?, Instant::now());
     let mut crowd = Crowd::gather(gateway.address, options.readers, options.devices).await?;
-    sleep(CROWDED.min(options.lasts)).await;
+    sleep(CROWDED.min(options.lasts / 3)).await;
     let spent = gateway.processor_time()? - before;
     let missed = reader.rounds().missed(options.devices, began, Timestamp::now());
     let memory = gateway.memory()?;
