@@ -248,6 +248,7 @@ const GLANCE = {
       point('oil', { name: 'Oil pressure', signal: 'engine.oil.pressure', unit: 'bar' }),
     ]),
   ],
+  manual: 'D-500 manual',
   joined: [],
 }
 
@@ -322,7 +323,11 @@ test('a controller of 2,000 points opens, scrolls and is searched', async () => 
     ),
   )
   const values = Array.from({ length: 2000 }, (_, index) => value(`p${index}`, index))
-  const gateway = await Imitated.start(snapshot([{ device: device('gen1'), values }]), { groups, joined: [] })
+  const gateway = await Imitated.start(snapshot([{ device: device('gen1'), values }]), {
+    manual: 'D-500 manual',
+    groups,
+    joined: [],
+  })
   const page = await open(`${gateway.address}#/devices/gen1`)
   await page.getByText('2000 points').waitFor()
   await line(page, 'p0').waitFor()

@@ -878,6 +878,11 @@ export interface components {
             groups: components["schemas"]["GroupView"][];
             /** @description What several of its points make up, in the order of the profile. */
             joined: components["schemas"]["JoinedPointView"][];
+            /**
+             * @description The maker's manual that says so: its title and its revision, as far as it has one.
+             * @example D-300 / 500 / 700 Modbus Application Manual, V5.6 (25.04.2016)
+             */
+            manual: string;
         };
         /** @description Why a request was not answered as asked, as `application/problem+json`. */
         Problem: {

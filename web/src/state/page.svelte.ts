@@ -90,7 +90,8 @@ export class Page {
 
   /** Fetches what the points of a device are. */
   loadPoints(device: Device, signal: AbortSignal): Promise<void> {
-    return this.#fetch(device, '', signal, ({ groups, joined }) => {
+    return this.#fetch(device, '', signal, ({ manual, groups, joined }) => {
+      device.manual = manual
       device.joined = joined
       device.groups = groups
     })

@@ -39,6 +39,8 @@ export class Cell {
 export class Device {
   view = $state.raw() as DeviceView
   alarms = $state.raw<readonly AlarmView[]>([])
+  /** Title and revision of the manual behind the points, fetched with them. */
+  manual = $state.raw('')
   /** What several points make up, fetched with the points. */
   joined = $state.raw<readonly JoinedPointView[]>([])
   /** What they make up now, by signal. */

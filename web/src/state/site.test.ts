@@ -120,7 +120,11 @@ describe('a device with a stream of its own', () => {
 
 describe('what the document knows of the cards', () => {
   const cards = {
-    'datakom-d': { groups: [group('Genset', [point('hz', { signal: 'genset.frequency' })])], joined: [] },
+    'datakom-d': {
+      manual: 'D-500 manual',
+      groups: [group('Genset', [point('hz', { signal: 'genset.frequency' })])],
+      joined: [],
+    },
   }
 
   test('is taken for the devices of that profile, and not after a restart', () => {

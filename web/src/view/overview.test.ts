@@ -64,7 +64,9 @@ afterEach(async () => {
 test('what the document knows of a card is filled when the state comes after it was drawn', () => {
   const points = [point('kw', { signal: 'genset.power.active', unit: 'kW' })]
   const streams = new Streams()
-  page = new Page(streams.open, undefined, { 'datakom-d': { groups: [group('Genset', points)], joined: [] } })
+  page = new Page(streams.open, undefined, {
+    'datakom-d': { manual: 'D-500 manual', groups: [group('Genset', points)], joined: [] },
+  })
   page.start()
   app = mount(App, { target: document.body, props: { page } })
   const whole = snapshot([{ device: device('gen1'), values: [value('kw', 312)] }])

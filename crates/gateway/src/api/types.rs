@@ -251,6 +251,9 @@ pub struct AlarmCounts {
 /// The points of a device, in the groups of its profile.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct PointsView {
+    /// The maker's manual that says so: its title and its revision, as far as it has one.
+    #[schema(examples("D-300 / 500 / 700 Modbus Application Manual, V5.6 (25.04.2016)"))]
+    pub manual: String,
     /// The groups in the order of the profile.
     pub groups: Vec<GroupView>,
     /// What several of its points make up, in the order of the profile.
@@ -270,6 +273,7 @@ impl PointsView {
             ..group.clone()
         });
         Self {
+            manual: self.manual.clone(),
             groups: groups.filter(|group| !group.points.is_empty()).collect(),
             joined: self
                 .joined

@@ -154,7 +154,14 @@ pub(crate) fn points_view(profile: &Profile) -> PointsView {
             .map(point_view)
             .collect(),
     });
+    let manual = &profile.manual;
     PointsView {
+        manual: [Some(&manual.title), manual.revision.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(String::as_str)
+            .collect::<Vec<_>>()
+            .join(", "),
         groups: groups.filter(|group| !group.points.is_empty()).collect(),
         joined: profile.joined().iter().map(|signal| joined_point_view(profile, signal)).collect(),
     }
