@@ -228,10 +228,11 @@ impl Poller {
         }
     }
 
-    /// Whether who answers may be asked once more because a read was refused. It is not when that is known of this very
-    /// round.
-    fn may_doubt(&self, now: Duration) -> bool {
-        self.known.is_none() && (self.proven || self.schedule.may_doubt(now))
+    /// Whether who answers may be asked once more because a read of these rates was refused. It is not when that is
+    /// known of this very round; and that all the rest is answered does not speak for what is read on demand.
+    fn may_doubt(&self, rates: Rates, now: Duration) -> bool {
+        let is_proven = self.proven && !rates.contains(Rate::OnDemand);
+        self.known.is_none() && (is_proven || self.schedule.may_doubt(now))
     }
 
     /// Whether points of a rate did not come for a reason that may pass.
@@ -304,7 +305,7 @@ impl Poller {
             };
             // What it always had it refuses now: perhaps it is another device, and the rest is not worth asking.
             let now = self.hub.now();
-            if failure.is_refusal() && !self.plan.is_refused(read) && self.may_doubt(now) {
+            if failure.is_refusal() && !self.plan.is_refused(read) && self.may_doubt(rates, now) {
                 self.schedule.doubt(now);
                 self.proven = false;
                 round.is_cut = true;
