@@ -496,6 +496,26 @@ async fn silence_is_kept_alive() {
     assert_eq!(before.elapsed(), KEEP_ALIVE);
 }
 
+#[tokio::test(start_paused = true)]
+async fn who_wants_nothing_of_what_happens_is_kept_alive_all_the_same() {
+    let (hub, _announcer) = site(&["gen1", "gen2"]);
+    let mut told = reader(&hub, "device=gen2");
+    told.over_the_state().await;
+    let busy = Arc::clone(&hub);
+    let talk = tokio::spawn(async move {
+        for tenths in 0..100 {
+            tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+            round(&busy, 0, &voltage(tenths));
+        }
+    });
+    let before = Instant::now();
+    for times in 1..=3 {
+        assert_eq!(told.next().await.name, "comment");
+        assert!(before.elapsed() <= KEEP_ALIVE * times + std::time::Duration::from_millis(2));
+    }
+    assert!(!talk.is_finished(), "there was something to tell each second");
+}
+
 #[tokio::test]
 async fn the_stream_ends_with_the_gateway() {
     let (hub, announcer) = site(&["gen1"]);
