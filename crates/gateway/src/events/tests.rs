@@ -301,6 +301,7 @@ async fn a_reader_that_fell_behind_is_told_the_state_of_each_device() {
         }
         round(hub, 0, &voltage(2999));
     };
+    hub.refuse("line 3".to_owned());
     flood(&hub);
     let mut names = Vec::new();
     let mut last = None;
@@ -309,10 +310,13 @@ async fn a_reader_that_fell_behind_is_told_the_state_of_each_device() {
         if event.data["device"] == "gen1" && event.name == "state" {
             assert!(event.data.to_string().contains("299.9"), "as it stands now");
         }
+        if event.name == "site" {
+            assert_eq!(event.data["config"]["refused"]["reason"], "line 3");
+        }
         names.push(event.name);
         last = event.id;
     }
-    assert_eq!(names, ["device", "alarms", "state", "device", "alarms", "state"]);
+    assert_eq!(names, ["site", "device", "alarms", "state", "device", "alarms", "state"]);
     round(&hub, 1, &FAST);
     let event = told.next().await;
     assert_eq!((event.name.as_str(), &event.data["device"]), ("values", &json!("gen2")));
@@ -321,7 +325,7 @@ async fn a_reader_that_fell_behind_is_told_the_state_of_each_device() {
     // Again, and at once: the whole state comes, but not more often than it is worth.
     let before = Instant::now();
     flood(&hub);
-    assert_eq!(told.next().await.name, "device");
+    assert_eq!(told.next().await.name, "site");
     assert!(before.elapsed() > REST / 2 && before.elapsed() <= REST, "{:?}", before.elapsed());
 }
 
