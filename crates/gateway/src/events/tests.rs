@@ -475,6 +475,23 @@ async fn other_devices_begin_with_a_snapshot() {
 }
 
 #[tokio::test]
+async fn what_was_under_way_of_a_device_that_is_gone_is_told_to_nobody() {
+    let (hub, _announcer) = site(&["gen1"]);
+    let mut told = reader(&hub, "");
+    told.over_the_state().await;
+    let gone = hub.table();
+    // Another one of the same id, perhaps on another wire.
+    hub.exchange(table(&["gen1"]));
+    assert_eq!(told.next().await.name, "snapshot");
+    told.over_the_state().await;
+    hub.finish(&gone.devices[0], answered(Rate::Fast, &[(100, &voltage(6_666))]));
+    round(&hub, 0, &voltage(2_310));
+    let event = told.next().await;
+    assert_eq!(event.name, "values");
+    assert_eq!(event.data["changed"][3]["value"], json!(231), "{event:?}");
+}
+
+#[tokio::test]
 async fn a_site_file_without_other_devices_is_told_by_itself() {
     let (hub, _announcer) = site(&["gen1"]);
     let mut told = reader(&hub, "");
