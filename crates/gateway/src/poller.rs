@@ -49,11 +49,13 @@ pub(crate) struct Poller {
     owed: bool,
 }
 
-/// The wire of a device, as its poller sees it.
+/// The wire of a device, as its poller sees it, and the place of the device among all.
 pub(crate) struct PolledWire {
     pub(crate) link: Link,
     /// What a read costs on it.
     pub(crate) cost: Cost,
+    /// Which of all devices it is.
+    pub(crate) place: usize,
 }
 
 /// What comes next.
@@ -64,7 +66,7 @@ enum Turn {
 
 impl Poller {
     pub(crate) fn new(hub: Arc<Hub>, slot: Arc<Slot>, wire: PolledWire) -> Self {
-        let PolledWire { link, cost } = wire;
+        let PolledWire { link, cost, place } = wire;
         let site = slot.lock().device.site().clone();
         let link = link
             .with_short_answers(site.profile.wire.over_read == OverRead::Truncate)
@@ -73,7 +75,7 @@ impl Poller {
             wire: link.state(),
             wire_failed: false,
             plan: PollPlan::new(site.profile, cost),
-            schedule: Schedule::new(site.poll, hub.now()),
+            schedule: Schedule::new(site.poll, place, hub.now()),
             known: None,
             other: None,
             proven: false,

@@ -62,7 +62,8 @@ impl Bench {
         let hub = Arc::new(Hub::new(table, stopped.clone()));
         let options = Options { timeout: Duration::from_millis(200), retries: 0, ..Options::default() };
         let cost = wires::cost(&endpoint, profile);
-        let wire = PolledWire { link: wires::for_polling(&Link::open(endpoint, options).unwrap()), cost };
+        let link = wires::for_polling(&Link::open(endpoint, options).unwrap());
+        let wire = PolledWire { link, cost, place: 0 };
         let polled = tokio::spawn(Poller::new(hub, Arc::clone(&slot), wire).run(stopped));
         Self { line, slot, _stop: announcer, tasks: [served, polled] }
     }
