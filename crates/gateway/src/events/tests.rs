@@ -20,13 +20,13 @@ use crate::testing::{answered, hub, table};
 
 const FAST: [u16; 12] = [0, 1, 0, 0, 2302, 0, 215, 0, 0, 0, 0, 0];
 
-fn voltage(tenths: u16) -> [u16; 12] {
+pub(super) fn voltage(tenths: u16) -> [u16; 12] {
     let mut registers = FAST;
     registers[4] = tenths;
     registers
 }
 
-fn site(devices: &[&str]) -> (Arc<Hub>, Announcer) {
+pub(super) fn site(devices: &[&str]) -> (Arc<Hub>, Announcer) {
     let (announcer, stop) = stop::channel();
     let hub = Arc::new(hub(devices, stop));
     tokio::spawn(beat(Arc::clone(&hub)));
@@ -55,29 +55,29 @@ fn wish(hub: &Hub, text: &str) -> Wish {
     Wish::new(&query(text), &hub.table()).unwrap_or_else(|_| panic!("{text}"))
 }
 
-fn reader(hub: &Arc<Hub>, text: &str) -> Told {
+pub(super) fn reader(hub: &Arc<Hub>, text: &str) -> Told {
     resumed(hub, text, None)
 }
 
-fn resumed(hub: &Arc<Hub>, text: &str, last: Option<&str>) -> Told {
+pub(super) fn resumed(hub: &Arc<Hub>, text: &str, last: Option<&str>) -> Told {
     Told { reader: Reader::new(Arc::clone(hub), wish(hub, text), last, false), text: String::new() }
 }
 
 /// One reader, event by event.
-struct Told {
+pub(super) struct Told {
     reader: Reader,
     text: String,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct Event {
-    name: String,
-    data: Value,
-    id: Option<String>,
+pub(super) struct Event {
+    pub(super) name: String,
+    pub(super) data: Value,
+    pub(super) id: Option<String>,
 }
 
 impl Told {
-    async fn next(&mut self) -> Event {
+    pub(super) async fn next(&mut self) -> Event {
         while !self.text.contains("\n\n") {
             let chunk = self.reader.next().await.expect("the stream goes on");
             self.text.push_str(std::str::from_utf8(&chunk).unwrap());
