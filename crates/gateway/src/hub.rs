@@ -3,6 +3,7 @@
 //! Every device has a lock of its own that is held for microseconds and never across an await, so a reader of the
 //! API holds up no poller and one device holds up no other.
 
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
@@ -90,11 +91,15 @@ impl Hub {
             config.revision += 1;
             config.view = ConfigView { loaded: wall_clock(), refused: None };
         }
-        let same = self.table().is_same(&table);
-        *self.table.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(table);
-        if same {
+        let (before, table) = (self.table(), Arc::new(table));
+        *self.table.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&table);
+        if before.is_same(&table) {
             self.tell(Draft::site(&self.info()));
         } else {
+            // What is under way on their wires is nobody's any more, and behind the snapshot it would be a lie.
+            let kept: HashSet<u64> = table.devices.iter().map(|slot| slot.key).collect();
+            let gone = before.devices.iter().filter(|slot| !kept.contains(&slot.key));
+            gone.for_each(|slot| slot.lock().is_gone = true);
             // Behind the table: who knows of the generation finds the table, or a newer one.
             let generation = self.generation.fetch_add(1, Ordering::SeqCst) + 1;
             self.tell([Draft::exchanged(generation)]);
@@ -120,6 +125,9 @@ impl Hub {
     pub(crate) fn finish(&self, slot: &Slot, round: Round) {
         let (now, ts, rates) = (self.now(), wall_clock(), round.rates);
         let mut live = slot.lock();
+        if live.is_gone {
+            return;
+        }
         let (was_online, had_fault) = (live.device.is_online(), live.device.fault().map(str::to_owned));
         let changes = live.device.finish(round, now, ts);
         note(&live.device, was_online, had_fault.as_deref());
@@ -133,7 +141,7 @@ impl Hub {
         for slot in &self.table().devices {
             let mut live = slot.lock();
             let expired = live.device.expire(self.now());
-            if expired.is_empty() {
+            if expired.is_empty() || live.is_gone {
                 continue;
             }
             let at = |live: &Live, rate| live.device.last_round(rate).unwrap_or_else(wall_clock);
@@ -191,7 +199,9 @@ impl Hub {
     }
 
     pub(crate) fn site(&self) -> SiteView {
-        SiteView { site: self.info(), devices: self.device_views(), diagram: self.table().diagram.clone() }
+        let table = self.table();
+        let devices = table.devices.iter().map(|slot| slot.lock().device.view()).collect();
+        SiteView { site: self.info(), devices, diagram: table.diagram.clone() }
     }
 
     pub(crate) fn device_views(&self) -> Vec<DeviceView> {

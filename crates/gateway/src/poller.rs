@@ -49,11 +49,13 @@ pub(crate) struct Poller {
     owed: bool,
 }
 
-/// The wire of a device, as its poller sees it.
+/// The wire of a device, as its poller sees it, and the place of the device among all.
 pub(crate) struct PolledWire {
     pub(crate) link: Link,
     /// What a read costs on it.
     pub(crate) cost: Cost,
+    /// Which of all devices it is.
+    pub(crate) place: usize,
 }
 
 /// What comes next.
@@ -64,7 +66,7 @@ enum Turn {
 
 impl Poller {
     pub(crate) fn new(hub: Arc<Hub>, slot: Arc<Slot>, wire: PolledWire) -> Self {
-        let PolledWire { link, cost } = wire;
+        let PolledWire { link, cost, place } = wire;
         let site = slot.lock().device.site().clone();
         let link = link
             .with_short_answers(site.profile.wire.over_read == OverRead::Truncate)
@@ -73,7 +75,7 @@ impl Poller {
             wire: link.state(),
             wire_failed: false,
             plan: PollPlan::new(site.profile, cost),
-            schedule: Schedule::new(site.poll, hub.now()),
+            schedule: Schedule::new(site.poll, place, hub.now()),
             known: None,
             other: None,
             proven: false,
@@ -228,10 +230,11 @@ impl Poller {
         }
     }
 
-    /// Whether who answers may be asked once more because a read was refused. It is not when that is known of this very
-    /// round.
-    fn may_doubt(&self, now: Duration) -> bool {
-        self.known.is_none() && (self.proven || self.schedule.may_doubt(now))
+    /// Whether who answers may be asked once more because a read of these rates was refused. It is not when that is
+    /// known of this very round; and that all the rest is answered does not speak for what is read on demand.
+    fn may_doubt(&self, rates: Rates, now: Duration) -> bool {
+        let is_proven = self.proven && !rates.contains(Rate::OnDemand);
+        self.known.is_none() && (is_proven || self.schedule.may_doubt(now))
     }
 
     /// Whether points of a rate did not come for a reason that may pass.
@@ -304,7 +307,7 @@ impl Poller {
             };
             // What it always had it refuses now: perhaps it is another device, and the rest is not worth asking.
             let now = self.hub.now();
-            if failure.is_refusal() && !self.plan.is_refused(read) && self.may_doubt(now) {
+            if failure.is_refusal() && !self.plan.is_refused(read) && self.may_doubt(rates, now) {
                 self.schedule.doubt(now);
                 self.proven = false;
                 round.is_cut = true;

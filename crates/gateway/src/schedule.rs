@@ -23,6 +23,10 @@ const LEAST_TRUST: Duration = Duration::from_secs(5);
 #[derive(Debug)]
 pub(crate) struct Schedule {
     poll: Poll,
+    /// How long after the first fast round the second one comes, so that not all devices are read in the same instant.
+    stagger: Duration,
+    /// Whether the fast round to come is the first one.
+    is_first: bool,
     fast: Duration,
     slow: Duration,
     /// None when it is done.
@@ -42,10 +46,16 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
-    /// Everything is due at `now`.
-    pub(crate) fn new(poll: Poll, now: Duration) -> Self {
+    /// Everything is due at `now`. Devices that have another place have their beat at another time.
+    pub(crate) fn new(poll: Poll, place: usize, now: Duration) -> Self {
+        Self::staggered(poll, stagger(place, poll.fast), now)
+    }
+
+    fn staggered(poll: Poll, stagger: Duration, now: Duration) -> Self {
         Self {
             poll,
+            stagger,
+            is_first: true,
             fast: now,
             slow: now,
             once: Some(now),
@@ -81,7 +91,7 @@ impl Schedule {
     pub(crate) fn identified(&mut self, now: Duration) {
         if std::mem::take(&mut self.wrong) {
             // Nothing is known of it.
-            (self.fast, self.slow, self.once) = (now, now, Some(now));
+            (self.fast, self.slow, self.once, self.is_first) = (now, now, Some(now), true);
         }
         (self.identity, self.identified) = (None, Some(now));
     }
@@ -96,7 +106,7 @@ impl Schedule {
     /// What it answered says neither yes nor no: it is asked again with what is due next.
     pub(crate) fn unclear(&mut self, now: Duration) {
         if self.silent.is_some() {
-            *self = Self { identified: self.identified, ..Self::new(self.poll, now) };
+            *self = Self { identified: self.identified, ..Self::staggered(self.poll, self.stagger, now) };
         }
         self.fast = following(self.fast, self.poll.fast, now);
         (self.once, self.identity) = (self.once.map(|once| once.max(self.fast)), Some(self.fast));
@@ -144,10 +154,13 @@ impl Schedule {
         if self.silent.take().is_some() {
             // It was away: who knows what changed. Who it is was asked.
             let Self { identity, identified, .. } = *self;
-            *self = Self { identity, identified, ..Self::new(self.poll, now) };
+            *self = Self { identity, identified, ..Self::staggered(self.poll, self.stagger, now) };
         }
         for rate in rates.iter() {
             match rate {
+                Rate::Fast if std::mem::take(&mut self.is_first) => {
+                    self.fast = after(self.fast + self.stagger, self.poll.fast, now);
+                }
                 Rate::Fast => self.fast = following(self.fast, self.poll.fast, now),
                 Rate::Slow => self.slow = following(self.slow, self.poll.slow, now),
                 Rate::Once => (self.once, self.once_done) = (None, Some(now)),
@@ -195,14 +208,25 @@ impl Schedule {
     }
 }
 
-/// The first instant of the grid `due`, `due + interval`, ... that is after `now`.
+/// Between half an interval and one and a half, spread evenly over however many places there are.
+fn stagger(place: usize, interval: Duration) -> Duration {
+    /// The golden section of 2^32: its multiples leave no wide gap and no crowd on a circle.
+    const GOLDEN: u32 = 0x9E37_79B9;
+    let part = (place as u32).wrapping_mul(GOLDEN);
+    let phase = interval.mul_f64(f64::from(part) / 2_f64.powi(32));
+    if phase < interval / 2 { interval + phase } else { phase }
+}
+
+/// The first instant of the grid `due`, `due + interval`, ... that is after `now`, `due` itself left out.
 fn following(due: Duration, interval: Duration, now: Duration) -> Duration {
-    let next = due + interval;
-    if next > now {
-        return next;
-    }
-    let missed = (now - due).as_nanos() / interval.as_nanos().max(1);
-    due + interval.saturating_mul(u32::try_from(missed).unwrap_or(u32::MAX).saturating_add(1))
+    after(due + interval, interval, now)
+}
+
+/// The first instant of the grid `first`, `first + interval`, ... that is after `now`.
+fn after(first: Duration, interval: Duration, now: Duration) -> Duration {
+    let Some(past) = now.checked_sub(first) else { return first };
+    let missed = past.as_nanos() / interval.as_nanos().max(1);
+    first + interval.saturating_mul(u32::try_from(missed).unwrap_or(u32::MAX).saturating_add(1))
 }
 
 #[cfg(test)]
@@ -244,7 +268,7 @@ mod tests {
 
     #[test]
     fn each_rate_has_its_beat_and_they_fall_together() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         let rounds = play(&mut schedule, ms(10_500), ms(10));
         assert_eq!(rounds[0], (rates([Rate::Fast, Rate::Slow, Rate::Once]), 0));
         assert_eq!(rounds[10], (rates([Rate::Fast, Rate::Slow]), 10_000));
@@ -256,9 +280,32 @@ mod tests {
     }
 
     #[test]
+    fn devices_begin_together_and_then_each_has_its_own_time() {
+        const DEVICES: usize = 1_000;
+        let mut began = [0_u32; 10];
+        for place in 0..DEVICES {
+            let mut schedule = Schedule::new(POLL, place, ms(77));
+            assert_eq!(schedule.due(ms(77)), rates([Rate::Fast, Rate::Slow, Rate::Once]), "all at once");
+            schedule.identified(ms(80));
+            schedule.done(schedule.due(ms(77)), ms(90));
+            let second = schedule.next();
+            assert!(second >= ms(577) && second < ms(1_577), "{second:?}");
+            began[(second.subsec_millis() / 100) as usize] += 1;
+            schedule.done(schedule.due(second), second + ms(3));
+            assert_eq!(schedule.next(), second + POLL.fast, "and keeps it");
+            // Those on one wire come back together, too.
+            schedule.silent(ms(5_000));
+            schedule.done(rates([Rate::Fast]), ms(6_000));
+            schedule.done(rates([Rate::Slow, Rate::Once]), ms(6_000));
+            assert_eq!(schedule.next() - ms(6_000), second - ms(77));
+        }
+        assert!(began.iter().all(|count| (95..=105).contains(count)), "{began:?}");
+    }
+
+    #[test]
     fn a_slow_beat_that_is_no_multiple_of_the_fast_one_waits_for_it() {
         let poll = Poll { fast: ms(1_000), slow: ms(2_500) };
-        let mut schedule = Schedule::new(poll, Duration::ZERO);
+        let mut schedule = Schedule::new(poll, 0, Duration::ZERO);
         let rounds = play(&mut schedule, ms(10_500), ms(10));
         assert_eq!(of(&rounds, Rate::Slow), [0, 3_000, 5_000, 8_000, 10_000]);
         assert_eq!(rounds.len(), 11);
@@ -266,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_slow_wire_is_owed_nothing() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         let rounds = play(&mut schedule, ms(30_000), ms(2_500));
         assert!(of(&rounds, Rate::Slow).len() >= 3, "the slow rate is not starved: {rounds:?}");
         assert!(of(&rounds, Rate::Fast).len() >= 10, "and the fast one goes on: {rounds:?}");
@@ -274,7 +321,7 @@ mod tests {
 
     #[test]
     fn a_new_identity_is_asked_for_at_once_and_a_missed_one_again() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         play(&mut schedule, ms(13_000), ms(1));
         schedule.reconnected(ms(13_100));
         assert_eq!((schedule.next(), schedule.due(ms(13_100))), (ms(13_100), rates([Rate::Once])));
@@ -288,7 +335,7 @@ mod tests {
 
     #[test]
     fn a_connection_that_is_made_anew_all_the_time_causes_no_storm() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         let (mut now, mut rounds) = (Duration::ZERO, Vec::new());
         let mut asked = 0;
         while now <= ms(30_000) {
@@ -310,7 +357,7 @@ mod tests {
 
     #[test]
     fn a_silent_device_is_probed_ever_more_rarely() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         let mut now = Duration::ZERO;
         let mut pauses = Vec::new();
         for _ in 0..7 {
@@ -329,7 +376,7 @@ mod tests {
 
     #[test]
     fn a_probe_that_the_wire_held_back_comes_when_it_lets_it_through() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         schedule.silent(ms(4_000));
         schedule.held(ms(5_000), ms(700));
         assert_eq!((schedule.next(), schedule.is_silent()), (ms(5_700), true));
@@ -342,7 +389,7 @@ mod tests {
 
     #[test]
     fn after_silence_everything_is_read_again() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         play(&mut schedule, ms(3_000), ms(1));
         schedule.silent(ms(3_100));
         assert!(schedule.asks_identity(ms(5_000)));
@@ -357,7 +404,7 @@ mod tests {
 
     #[test]
     fn a_steady_connection_that_drops_is_doubted_at_once() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         play(&mut schedule, ms(2_500), ms(1));
         schedule.steady();
         schedule.reconnected(ms(2_600));
@@ -374,7 +421,7 @@ mod tests {
 
     #[test]
     fn another_device_is_asked_nothing_but_who_it_is() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         schedule.wrong(ms(100));
         assert_eq!((schedule.next(), schedule.is_wrong(), schedule.is_polled()), (ms(3_100), true, false));
         schedule.wrong(ms(3_100));
@@ -388,7 +435,7 @@ mod tests {
 
     #[test]
     fn who_says_neither_yes_nor_no_is_asked_again_with_the_next_round() {
-        let mut schedule = Schedule::new(POLL, Duration::ZERO);
+        let mut schedule = Schedule::new(POLL, 0, Duration::ZERO);
         schedule.unclear(ms(20));
         assert_eq!((schedule.next(), schedule.asks_identity(ms(999))), (ms(1_000), false));
         assert!(schedule.asks_identity(ms(1_000)));
@@ -397,7 +444,7 @@ mod tests {
 
     #[test]
     fn who_it_is_is_not_doubted_all_the_time() {
-        let mut schedule = Schedule::new(Poll { fast: ms(50), slow: ms(200) }, Duration::ZERO);
+        let mut schedule = Schedule::new(Poll { fast: ms(50), slow: ms(200) }, 0, Duration::ZERO);
         assert!(schedule.may_doubt(Duration::ZERO));
         schedule.identified(ms(10));
         assert!(!schedule.may_doubt(ms(5_009)) && schedule.may_doubt(ms(5_010)));

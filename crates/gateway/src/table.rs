@@ -60,6 +60,8 @@ pub(crate) struct Live {
     pub(crate) device: Device,
     /// Number of the last event of this device: an event that a snapshot already holds is not sent after it.
     pub(crate) sequence: u64,
+    /// Whether the site file does not have it any more: another one may have its id.
+    pub(crate) is_gone: bool,
 }
 
 impl Slot {
@@ -69,7 +71,7 @@ impl Slot {
             key: KEYS.fetch_add(1, Ordering::Relaxed),
             id: device.site().id.clone(),
             looks: Looks::default(),
-            live: Mutex::new(Live { device, sequence: 0 }),
+            live: Mutex::new(Live { device, sequence: 0, is_gone: false }),
             plan: Mutex::default(),
         }
     }

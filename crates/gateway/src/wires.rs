@@ -17,13 +17,11 @@ use crate::api::types::{
     WireView,
 };
 use crate::poll_plan::Overview;
-use crate::site::{Site, SiteDevice, SiteWire};
+use crate::site::{SiteDevice, SiteWire};
 
-/// Opens a wire for the devices of the site that are on it.
-pub(crate) fn open(site: &Site, index: usize, wire: &SiteWire) -> Result<Link, OpenError> {
-    let devices = site.devices.iter().filter(|device| device.wire == index);
-    let profiles: Vec<&Profile> = devices.map(|device| device.profile).collect();
-    Link::open(wire.endpoint.clone(), options(wire, &profiles))
+/// Opens a wire for devices of these profiles.
+pub(crate) fn open(wire: &SiteWire, profiles: &[&Profile]) -> Result<Link, OpenError> {
+    Link::open(wire.endpoint.clone(), options(wire, profiles))
 }
 
 /// How a wire with devices of these profiles behaves.

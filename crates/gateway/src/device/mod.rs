@@ -288,10 +288,12 @@ impl Device {
                 self.took = round.took;
             }
             self.online = true;
-            self.silence = None;
-            self.fault = refused
-                .filter(|_| round.answers.is_empty())
-                .map(|(_, failure)| format!("{name} answers, but refuses what it is asked: {failure}; check that it is what its profile is for"));
+            // What is read rarely may be all that it refuses.
+            if self.silence.take().is_some() || round.rates.contains(self.most_frequent()) {
+                self.fault = refused
+                    .filter(|_| round.answers.is_empty())
+                    .map(|(_, failure)| format!("{name} answers, but refuses what it is asked: {failure}; check that it is what its profile is for"));
+            }
             return;
         };
         if !self.silence.as_ref().is_some_and(|known| failure.is_no_news_after(known)) {
@@ -454,6 +456,15 @@ impl Device {
                 joined.judge(parts).then_some(index)
             })
             .collect()
+    }
+
+    /// The rate of the rounds that tell how the device fares.
+    fn most_frequent(&self) -> Rate {
+        RATES
+            .into_iter()
+            .zip(&self.read)
+            .find(|(_, points)| !points.is_empty())
+            .map_or(Rate::Fast, |(rate, _)| rate)
     }
 
     fn stale_after(&self, rate: Rate) -> Option<Duration> {

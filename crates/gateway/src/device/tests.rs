@@ -200,6 +200,19 @@ fn a_device_that_refuses_everything_is_online_with_a_fault() {
 }
 
 #[test]
+fn a_device_that_refuses_only_what_is_read_rarely_has_no_fault() {
+    let mut device = running();
+    for (rate, address) in [(Rate::Slow, 126), (Rate::Once, 130), (Rate::OnDemand, 152)] {
+        device.finish(failed(rate, address, 2, refusal(2)), at(1), ts(1));
+        assert_eq!(device.view().fault, None, "{rate:?}");
+    }
+    assert_eq!(
+        (value(&device, "starts").quality, value(&device, "picture").quality),
+        (Shown::Bad, Shown::Bad)
+    );
+}
+
+#[test]
 fn silence_makes_every_rate_bad_and_takes_no_alarm_away() {
     let mut device = running();
     device.finish(answered(Rate::Fast, &[(100, &with(&[(10, 1)]))]), at(1), ts(1));

@@ -9,6 +9,8 @@ mod channel;
 mod deflate;
 mod event;
 mod filter;
+#[cfg(test)]
+mod interleaved;
 mod reader;
 mod ring;
 #[cfg(test)]

@@ -7,13 +7,12 @@ use std::time::Duration;
 use axum::body::Bytes;
 use futures_util::FutureExt;
 use tokio::sync::watch;
-use tokio::time::{Instant, sleep, sleep_until};
+use tokio::time::{Instant, sleep_until};
 
 use super::channel::Seat;
 use super::deflate::{self, Envelope};
 use super::event::{About, Event, Frame, put};
 use super::filter::{View, Wish};
-
 use super::whole::Whole;
 use crate::api::types::ResumedEvent;
 use crate::hub::Hub;
@@ -41,6 +40,8 @@ pub(super) struct Reader {
     phase: Phase,
     /// When the whole state was last begun.
     begun: Instant,
+    /// When something was last said.
+    spoke: Instant,
     /// Set when the stream is compressed.
     envelope: Option<Envelope>,
     /// What goes out before everything else, as it is.
@@ -82,7 +83,20 @@ impl Reader {
             None => (Some(generation), Phase::Telling(Whole::snapshot(&hub, &table, &wish))),
         };
         let begun = Instant::now();
-        Self { hub, wish, view, generation, phase, begun, envelope, head, news, stop, _seat: seat }
+        Self {
+            hub,
+            wish,
+            view,
+            generation,
+            phase,
+            begun,
+            spoke: begun,
+            envelope,
+            head,
+            news,
+            stop,
+            _seat: seat,
+        }
     }
 
     /// The next bytes to send; none at the end.
@@ -94,7 +108,12 @@ impl Reader {
             let announced = *self.news.borrow_and_update();
             let mut chunk = Chunk::default();
             self.fill(&mut chunk, announced);
+            // What happens may all be nothing to this reader.
+            if chunk.is_empty() && self.spoke + KEEP_ALIVE <= Instant::now() {
+                chunk.own(&mut self.envelope, b": keep-alive\n\n".to_vec());
+            }
             if let Some(bytes) = chunk.take(&mut self.head) {
+                self.spoke = Instant::now();
                 return Some(bytes);
             }
             let rest = match self.phase {
@@ -106,11 +125,7 @@ impl Reader {
                 () = self.stop.requested() => {}
                 () = sleep_until(rest.unwrap_or(self.begun)), if rest.is_some() => {}
                 _ = self.news.changed(), if rest.is_none() => {}
-                () = sleep(KEEP_ALIVE) => {
-                    let mut chunk = Chunk::default();
-                    chunk.own(&mut self.envelope, b": keep-alive\n\n".to_vec());
-                    return chunk.take(&mut self.head);
-                }
+                () = sleep_until(self.spoke + KEEP_ALIVE) => {}
             }
         }
     }

@@ -20,13 +20,13 @@ use crate::testing::{answered, hub, table};
 
 const FAST: [u16; 12] = [0, 1, 0, 0, 2302, 0, 215, 0, 0, 0, 0, 0];
 
-fn voltage(tenths: u16) -> [u16; 12] {
+pub(super) fn voltage(tenths: u16) -> [u16; 12] {
     let mut registers = FAST;
     registers[4] = tenths;
     registers
 }
 
-fn site(devices: &[&str]) -> (Arc<Hub>, Announcer) {
+pub(super) fn site(devices: &[&str]) -> (Arc<Hub>, Announcer) {
     let (announcer, stop) = stop::channel();
     let hub = Arc::new(hub(devices, stop));
     tokio::spawn(beat(Arc::clone(&hub)));
@@ -55,29 +55,29 @@ fn wish(hub: &Hub, text: &str) -> Wish {
     Wish::new(&query(text), &hub.table()).unwrap_or_else(|_| panic!("{text}"))
 }
 
-fn reader(hub: &Arc<Hub>, text: &str) -> Told {
+pub(super) fn reader(hub: &Arc<Hub>, text: &str) -> Told {
     resumed(hub, text, None)
 }
 
-fn resumed(hub: &Arc<Hub>, text: &str, last: Option<&str>) -> Told {
+pub(super) fn resumed(hub: &Arc<Hub>, text: &str, last: Option<&str>) -> Told {
     Told { reader: Reader::new(Arc::clone(hub), wish(hub, text), last, false), text: String::new() }
 }
 
 /// One reader, event by event.
-struct Told {
+pub(super) struct Told {
     reader: Reader,
     text: String,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct Event {
-    name: String,
-    data: Value,
-    id: Option<String>,
+pub(super) struct Event {
+    pub(super) name: String,
+    pub(super) data: Value,
+    pub(super) id: Option<String>,
 }
 
 impl Told {
-    async fn next(&mut self) -> Event {
+    pub(super) async fn next(&mut self) -> Event {
         while !self.text.contains("\n\n") {
             let chunk = self.reader.next().await.expect("the stream goes on");
             self.text.push_str(std::str::from_utf8(&chunk).unwrap());
@@ -301,6 +301,7 @@ async fn a_reader_that_fell_behind_is_told_the_state_of_each_device() {
         }
         round(hub, 0, &voltage(2999));
     };
+    hub.refuse("line 3".to_owned());
     flood(&hub);
     let mut names = Vec::new();
     let mut last = None;
@@ -309,10 +310,13 @@ async fn a_reader_that_fell_behind_is_told_the_state_of_each_device() {
         if event.data["device"] == "gen1" && event.name == "state" {
             assert!(event.data.to_string().contains("299.9"), "as it stands now");
         }
+        if event.name == "site" {
+            assert_eq!(event.data["config"]["refused"]["reason"], "line 3");
+        }
         names.push(event.name);
         last = event.id;
     }
-    assert_eq!(names, ["device", "alarms", "state", "device", "alarms", "state"]);
+    assert_eq!(names, ["site", "device", "alarms", "state", "device", "alarms", "state"]);
     round(&hub, 1, &FAST);
     let event = told.next().await;
     assert_eq!((event.name.as_str(), &event.data["device"]), ("values", &json!("gen2")));
@@ -321,7 +325,7 @@ async fn a_reader_that_fell_behind_is_told_the_state_of_each_device() {
     // Again, and at once: the whole state comes, but not more often than it is worth.
     let before = Instant::now();
     flood(&hub);
-    assert_eq!(told.next().await.name, "device");
+    assert_eq!(told.next().await.name, "site");
     assert!(before.elapsed() > REST / 2 && before.elapsed() <= REST, "{:?}", before.elapsed());
 }
 
@@ -471,6 +475,23 @@ async fn other_devices_begin_with_a_snapshot() {
 }
 
 #[tokio::test]
+async fn what_was_under_way_of_a_device_that_is_gone_is_told_to_nobody() {
+    let (hub, _announcer) = site(&["gen1"]);
+    let mut told = reader(&hub, "");
+    told.over_the_state().await;
+    let gone = hub.table();
+    // Another one of the same id, perhaps on another wire.
+    hub.exchange(table(&["gen1"]));
+    assert_eq!(told.next().await.name, "snapshot");
+    told.over_the_state().await;
+    hub.finish(&gone.devices[0], answered(Rate::Fast, &[(100, &voltage(6_666))]));
+    round(&hub, 0, &voltage(2_310));
+    let event = told.next().await;
+    assert_eq!(event.name, "values");
+    assert_eq!(event.data["changed"][3]["value"], json!(231), "{event:?}");
+}
+
+#[tokio::test]
 async fn a_site_file_without_other_devices_is_told_by_itself() {
     let (hub, _announcer) = site(&["gen1"]);
     let mut told = reader(&hub, "");
@@ -494,6 +515,26 @@ async fn silence_is_kept_alive() {
     let before = Instant::now();
     assert_eq!(told.reader.next().await.unwrap(), ": keep-alive\n\n");
     assert_eq!(before.elapsed(), KEEP_ALIVE);
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_wants_nothing_of_what_happens_is_kept_alive_all_the_same() {
+    let (hub, _announcer) = site(&["gen1", "gen2"]);
+    let mut told = reader(&hub, "device=gen2");
+    told.over_the_state().await;
+    let busy = Arc::clone(&hub);
+    let talk = tokio::spawn(async move {
+        for tenths in 0..100 {
+            tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+            round(&busy, 0, &voltage(tenths));
+        }
+    });
+    let before = Instant::now();
+    for times in 1..=3 {
+        assert_eq!(told.next().await.name, "comment");
+        assert!(before.elapsed() <= KEEP_ALIVE * times + std::time::Duration::from_millis(2));
+    }
+    assert!(!talk.is_finished(), "there was something to tell each second");
 }
 
 #[tokio::test]

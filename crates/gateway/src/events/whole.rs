@@ -29,6 +29,8 @@ pub(super) struct Whole {
 enum Stage {
     Head,
     Devices,
+    /// In place of those two, for a reader that had them.
+    Site,
     States,
 }
 
@@ -40,7 +42,7 @@ impl Whole {
 
     /// What replaces the events that a reader missed who knows the devices.
     pub(super) fn again(hub: &Hub, table: &Table, wish: &Wish) -> Self {
-        Self::new(hub, table, wish, Stage::States)
+        Self::new(hub, table, wish, Stage::Site)
     }
 
     fn new(hub: &Hub, table: &Table, wish: &Wish, stage: Stage) -> Self {
@@ -94,8 +96,19 @@ impl Whole {
                 }
                 None => self.end_snapshot(hub, out),
             },
+            Stage::Site => self.site(hub, out),
             Stage::States => self.state(hub, view, out),
         }
+    }
+
+    fn site(&mut self, hub: &Hub, out: &mut Vec<u8>) {
+        put(out, "site", &hub.info(), self.id_if_last(hub).as_deref());
+        self.stage = Stage::States;
+    }
+
+    /// The id of an event behind which there are no devices.
+    fn id_if_last(&self, hub: &Hub) -> Option<String> {
+        self.slots.is_empty().then(|| hub.channel().id(self.position))
     }
 
     fn end_snapshot(&mut self, hub: &Hub, out: &mut Vec<u8>) {
@@ -104,8 +117,7 @@ impl Whole {
         out.extend_from_slice(b"],\"alarms\":");
         json(out, &alarms);
         out.push(b'}');
-        let id = self.slots.is_empty().then(|| hub.channel().id(self.position));
-        ended(out, id.as_deref());
+        ended(out, self.id_if_last(hub).as_deref());
         (self.stage, self.at) = (Stage::States, 0);
     }
 

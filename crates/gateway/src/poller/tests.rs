@@ -27,6 +27,8 @@ struct Line {
     holds: u16,
     /// A read at this address gets no answer.
     mute: Option<u16>,
+    /// A read of any of these is refused.
+    lacks: std::ops::Range<u16>,
 }
 
 struct Bench {
@@ -60,7 +62,8 @@ impl Bench {
         let hub = Arc::new(Hub::new(table, stopped.clone()));
         let options = Options { timeout: Duration::from_millis(200), retries: 0, ..Options::default() };
         let cost = wires::cost(&endpoint, profile);
-        let wire = PolledWire { link: wires::for_polling(&Link::open(endpoint, options).unwrap()), cost };
+        let link = wires::for_polling(&Link::open(endpoint, options).unwrap());
+        let wire = PolledWire { link, cost, place: 0 };
         let polled = tokio::spawn(Poller::new(hub, Arc::clone(&slot), wire).run(stopped));
         Self { line, slot, _stop: announcer, tasks: [served, polled] }
     }
@@ -102,21 +105,25 @@ async fn serve(listener: TcpListener, line: Arc<Mutex<Line>>, delay: Duration) {
     while stream.read_exact(&mut request).await.is_ok() {
         let address = u16::from_be_bytes([request[8], request[9]]);
         let count = u16::from_be_bytes([request[10], request[11]]);
-        let (holds, mute) = {
+        let (holds, mute, lacks) = {
             let mut line = line.lock().unwrap();
             line.reads.push((address, count));
-            (line.holds, line.mute)
+            (line.holds, line.mute, line.lacks.clone())
         };
         if mute == Some(address) {
             continue;
         }
         tokio::time::sleep(delay).await;
         let mut answer = request[..4].to_vec();
-        answer.extend((3 + 2 * count).to_be_bytes());
-        answer.extend([request[6], 3, (2 * count) as u8]);
-        for register in address..address + count {
-            let value = if register == 10_609 { 0xD500 } else { holds };
-            answer.extend(value.to_be_bytes());
+        if address < lacks.end && lacks.start < address + count {
+            answer.extend([0, 3, request[6], 0x83, 2]);
+        } else {
+            answer.extend((3 + 2 * count).to_be_bytes());
+            answer.extend([request[6], 3, (2 * count) as u8]);
+            for register in address..address + count {
+                let value = if register == 10_609 { 0xD500 } else { holds };
+                answer.extend(value.to_be_bytes());
+            }
         }
         if stream.write_all(&answer).await.is_err() {
             return;
@@ -202,4 +209,23 @@ async fn half_of_a_picture_never_goes_with_half_of_another() {
     assert!(bench.slot.lock().device.is_online());
     bench.line.lock().unwrap().mute = None;
     bench.picture(|raw, is_good| raw == Some(&[7; 512]) && is_good).await;
+}
+
+#[tokio::test]
+async fn a_picture_that_the_device_does_not_have_is_no_doubt_about_the_device() {
+    let bench = Bench::new(Duration::from_millis(20), Duration::ZERO).await;
+    bench.line.lock().unwrap().lacks = LCD;
+    bench.until(|| bench.slot.lock().device.is_online()).await;
+    let _look = bench.look("display");
+    let lcd = builtin("datakom-d").unwrap().point_index("lcd").unwrap();
+    bench
+        .until(|| {
+            let live = bench.slot.lock();
+            assert_eq!(live.device.fault(), None, "all the rest is there");
+            live.device.value(lcd).error.is_some_and(|error| error.contains("exception 2"))
+        })
+        .await;
+    // Asked at the start, and once because of the refusal.
+    let asked = bench.reads().iter().filter(|read| **read == (10_609, 1)).count();
+    assert!((1..=2).contains(&asked), "{asked}");
 }
