@@ -110,7 +110,7 @@ async fn known_host(State(known): State<Known>, request: Request, next: Next) ->
         let detail = "the request has no Host header, or more than one, or one that names no host; send one";
         return Problem::new(StatusCode::BAD_REQUEST, detail).into_response();
     }
-    if !known.address.is_loopback() {
+    if !known.address.to_canonical().is_loopback() {
         return next.run(request).await;
     }
     match host {
@@ -250,6 +250,7 @@ mod tests {
             ("::", "10.0.0.7:8080", StatusCode::OK),
             ("127.0.0.1", "gateway.site.example", StatusCode::MISDIRECTED_REQUEST),
             ("::1", "localhost", StatusCode::OK),
+            ("::ffff:127.0.0.1", "gateway.site.example", StatusCode::MISDIRECTED_REQUEST),
             ("127.0.0.1", "power.example.org", StatusCode::OK),
             ("127.0.0.1", "POWER.example.org:443", StatusCode::OK),
             ("127.0.0.1", "x.power.example.org", StatusCode::MISDIRECTED_REQUEST),
