@@ -186,14 +186,35 @@ impl Site {
 /// The parser's words for a mistake, and a remedy for those that people make most.
 fn syntax(text: &str, at: usize, message: &str) -> (String, &'static str) {
     let (before, after) = text.split_at_checked(at).unwrap_or((text, ""));
-    if before.trim_end_matches([' ', '\t']).ends_with('=') && after.starts_with(char::is_alphabetic) {
-        return ("a text without quotes".to_owned(), "put it in quotes");
+    if before.trim_end_matches([' ', '\t']).ends_with('=')
+        && let Some((message, help)) = unquoted(after, message)
+    {
+        return (message.to_owned(), help);
     }
     let help = match message.contains("duplicate key") {
         true => "write every key and every [table] once; the tables of a list are headed [[so]]",
         false => "mend the syntax; https://toml.io shows it",
     };
     (message.replace('\n', ", "), help)
+}
+
+/// What a value may be meant for that stands without quotes, or without those that TOML knows, and what to do.
+fn unquoted(value: &str, message: &str) -> Option<(&'static str, &'static str)> {
+    let word: String = value.chars().take_while(|c| c.is_alphanumeric()).collect();
+    let is_choice =
+        ["true", "false", "yes", "no", "on", "off"].iter().any(|no| word.eq_ignore_ascii_case(no));
+    match value.chars().next()? {
+        _ if is_choice => Some(("a yes or no in other words", "write true or false, in small letters")),
+        '“' | '”' | '„' | '‘' | '’' | '«' | '»' => {
+            Some(("quotes of a word processor", "write straight ones, as in \"North hospital\""))
+        }
+        c if c.is_alphabetic() => Some(("a text without quotes", "put it in quotes")),
+        c if c.is_ascii_digit() && message.contains("must be quoted") => Some((
+            "a number with something behind it",
+            "put a text or a duration in quotes; behind a number nothing but a comment may follow",
+        )),
+        _ => None,
+    }
 }
 
 /// What stands in for a part that has been reported missing or wrong is never seen: the findings stop it.

@@ -10,8 +10,9 @@ use thiserror::Error;
 
 const MODBUS_PORT: u16 = 502;
 const SECURE_PORT: u16 = 802;
+/// Those that can be spoken.
 const EXAMPLES: &str =
-    "tcp://HOST:502, rtu:///dev/ttyUSB0?baud=9600&parity=none&stop=1, rtu+tcp://HOST:502 or tls://HOST:802";
+    "tcp://HOST:502, rtu:///dev/ttyUSB0?baud=9600&parity=none&stop=1 or rtu+tcp://HOST:502";
 
 /// One end of a wire, as a URL names it.
 ///

@@ -17,6 +17,7 @@ use tower_http::set_header::SetResponseHeaderLayer;
 
 use super::held::{Pieces, holding};
 use super::limits::Limits;
+use super::streams::{Peer, Streams};
 use crate::api::{EVENTS, Problem};
 use crate::hub::Hub;
 
@@ -109,7 +110,7 @@ async fn known_host(State(known): State<Known>, request: Request, next: Next) ->
         let detail = "the request has no Host header, or more than one, or one that names no host; send one";
         return Problem::new(StatusCode::BAD_REQUEST, detail).into_response();
     }
-    if !known.address.is_loopback() {
+    if !known.address.to_canonical().is_loopback() {
         return next.run(request).await;
     }
     match host {
@@ -147,19 +148,14 @@ fn is_this_machine(host: &str) -> bool {
     host.eq_ignore_ascii_case("localhost") || literal.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
 }
 
-/// Places for readers of the event stream.
-pub(crate) fn streams(limits: &Limits) -> Arc<Semaphore> {
-    Arc::new(Semaphore::new(limits.streams))
-}
-
 /// Counts the readers of the event stream: one more than there is room for is told to come back.
-pub(crate) async fn counted(State(places): State<Arc<Semaphore>>, request: Request, next: Next) -> Response {
+pub(crate) async fn counted(State(streams): State<Arc<Streams>>, request: Request, next: Next) -> Response {
     if request.uri().path() != EVENTS || request.method() != Method::GET {
         return next.run(request).await;
     }
-    match places.try_acquire_owned() {
-        Ok(place) => holding(next.run(request).await, place),
-        Err(_) => busy(
+    match streams.take(Peer::in_request(request.extensions())) {
+        Some(place) => place.hold(next.run(request).await),
+        None => busy(
             "as many readers as there is room for have the event stream open; try again, or ask for the values",
         ),
     }
@@ -170,10 +166,13 @@ pub(crate) fn waiting(limits: &Limits) -> Arc<Semaphore> {
     Arc::new(Semaphore::new(limits.waiting_kib))
 }
 
+/// Answers that are not weighed: whether the gateway lives can be asked even when there is no room.
+const LIGHT: u64 = 1_024;
+
 /// Weighs answers that are in memory whole: clients that ask and do not read must not fill it.
 pub(crate) async fn weighed(State(room): State<Arc<Semaphore>>, request: Request, next: Next) -> Response {
     let response = next.run(request).await;
-    let Some(length) = response.body().size_hint().exact().filter(|length| *length > 0) else {
+    let Some(length) = response.body().size_hint().exact().filter(|length| *length > LIGHT) else {
         return response;
     };
     let kib = u32::try_from(length.div_ceil(1_024)).unwrap_or(u32::MAX);
@@ -251,6 +250,7 @@ mod tests {
             ("::", "10.0.0.7:8080", StatusCode::OK),
             ("127.0.0.1", "gateway.site.example", StatusCode::MISDIRECTED_REQUEST),
             ("::1", "localhost", StatusCode::OK),
+            ("::ffff:127.0.0.1", "gateway.site.example", StatusCode::MISDIRECTED_REQUEST),
             ("127.0.0.1", "power.example.org", StatusCode::OK),
             ("127.0.0.1", "POWER.example.org:443", StatusCode::OK),
             ("127.0.0.1", "x.power.example.org", StatusCode::MISDIRECTED_REQUEST),

@@ -5,9 +5,11 @@ use std::time::Duration;
 /// What one client, and all of them together, may ask of the server.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Connections at a time. At this bound the one that has been idle longest makes room for the next.
+    /// Connections at a time. At this bound the one that has been idle longest makes room for the next; where none is
+    /// idle, one of the client that has by far the most.
     pub connections: usize,
-    /// Readers of the event stream among them.
+    /// Readers of the event stream among them. At this bound the client that has the most gives a place to one that has
+    /// fewer.
     pub streams: usize,
     /// KiB of answers that are ready and wait for their readers, all together.
     pub waiting_kib: usize,

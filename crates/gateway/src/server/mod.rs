@@ -5,6 +5,7 @@ mod held;
 mod limits;
 mod places;
 mod refusal;
+mod streams;
 
 use std::net::SocketAddr;
 use std::pin::pin;
@@ -26,6 +27,7 @@ use self::guard::{Known, header_unless_set};
 pub use self::limits::Limits;
 use self::places::{Activity, Places};
 use self::refusal::Worded;
+use self::streams::{Peer, Streams};
 use crate::api;
 use crate::hub::Hub;
 use crate::page;
@@ -74,8 +76,8 @@ async fn accept(listener: TcpListener, router: Router, limits: Limits, stop: Sto
                 places.leave(left.map_or_else(|error| error.id(), |(id, ())| id));
             }
             accepted = listener.accept(), if !crowded => match accepted {
-                Ok((stream, _)) => {
-                    let activity = Arc::new(Activity::new(origin));
+                Ok((stream, from)) => {
+                    let activity = Arc::new(Activity::new(origin, Peer::of(from.ip())));
                     let connection = connection(stream, router.clone(), limits, Arc::clone(&activity), stop.clone());
                     places.take(connections.spawn(connection), activity);
                     if connections.len() >= limits.connections {
@@ -89,7 +91,7 @@ async fn accept(listener: TcpListener, router: Router, limits: Limits, stop: Sto
                     sleep(CROWDED).await;
                 }
             },
-            () = sleep(CROWDED), if crowded => { places.make_room(some); }
+            () = sleep(CROWDED), if crowded => places.make_room(some),
         }
     }
     drop(listener);
@@ -113,7 +115,8 @@ async fn connection(
         move || activity.mark()
     });
     let router = TowerToHyperService::new(router);
-    let service = hyper::service::service_fn(move |request| {
+    let service = hyper::service::service_fn(move |mut request: hyper::Request<hyper::body::Incoming>| {
+        request.extensions_mut().insert(activity.peer());
         let answering = activity.answering();
         let answer = hyper::service::Service::call(&router, request);
         async move { answer.await.map(|response| held::holding(response, answering)) }
@@ -144,7 +147,7 @@ fn router(hub: Arc<Hub>, known: Known, limits: &Limits) -> Router {
         .layer(from_fn(api::tagged))
         .layer(from_fn_with_state(waiting, guard::weighed))
         .layer(CompressionLayer::new())
-        .layer(from_fn_with_state(guard::streams(limits), guard::counted))
+        .layer(from_fn_with_state(Streams::new(limits.streams), guard::counted))
         .layer(header_unless_set(header::CACHE_CONTROL, "no-store"))
         .layer(header_unless_set(header::VARY, "accept-encoding"));
     guard::guarded(Router::new().merge(api).merge(document).merge(page::files()), known)

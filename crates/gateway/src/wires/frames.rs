@@ -58,21 +58,23 @@ fn meaning(framing: Framing, direction: Direction, bytes: &[u8]) -> String {
 
 fn asked(request: &Request<'_>) -> String {
     match request {
-        Request::ReadCoils { address, count } => format!("read {count} coils from {address}"),
-        Request::ReadDiscreteInputs { address, count } => format!("read {count} inputs from {address}"),
+        Request::ReadCoils { address, count } => format!("read {} from {address}", many(*count, "coil")),
+        Request::ReadDiscreteInputs { address, count } => {
+            format!("read {} from {address}", many(*count, "input"))
+        }
         Request::ReadHoldingRegisters { address, count } => {
-            format!("read {count} holding registers from {address}")
+            format!("read {} from {address}", many(*count, "holding register"))
         }
         Request::ReadInputRegisters { address, count } => {
-            format!("read {count} input registers from {address}")
+            format!("read {} from {address}", many(*count, "input register"))
         }
         Request::WriteSingleCoil { address, value } => format!("write {value:04X}h to coil {address}"),
         Request::WriteSingleRegister { address, value } => format!("write {value} to register {address}"),
         Request::WriteMultipleCoils { address, coils } => {
-            format!("write {} coils from {address}", coils.len())
+            format!("write {} from {address}", many(coils.len(), "coil"))
         }
         Request::WriteMultipleRegisters { address, registers } => {
-            format!("write {} registers from {address}", registers.len())
+            format!("write {} from {address}", many(registers.len(), "register"))
         }
         Request::Other { function, .. } => format!("function {function}"),
     }
@@ -80,20 +82,30 @@ fn asked(request: &Request<'_>) -> String {
 
 fn answered(response: &Response<'_>) -> String {
     match response {
-        Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits) => format!("{} bits", bits.len()),
+        Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits) => many(bits.len(), "bit"),
         Response::ReadHoldingRegisters(registers) | Response::ReadInputRegisters(registers) => {
-            format!("{} registers", registers.len())
+            many(registers.len(), "register")
         }
         Response::WriteSingleCoil { address, .. } => format!("coil {address} written"),
         Response::WriteSingleRegister { address, .. } => format!("register {address} written"),
-        Response::WriteMultipleCoils { address, count } => format!("{count} coils from {address} written"),
+        Response::WriteMultipleCoils { address, count } => {
+            format!("{} from {address} written", many(*count, "coil"))
+        }
         Response::WriteMultipleRegisters { address, count } => {
-            format!("{count} registers from {address} written")
+            format!("{} from {address} written", many(*count, "register"))
         }
         Response::Exception { function, code } => {
             format!("function {function} refused with exception {} ({})", code.0, code.name())
         }
         Response::Other { function, .. } => format!("function {function}"),
+    }
+}
+
+/// How many of what.
+fn many(count: impl Into<usize>, what: &str) -> String {
+    match count.into() {
+        1 => format!("1 {what}"),
+        count => format!("{count} {what}s"),
     }
 }
 
@@ -120,6 +132,8 @@ mod tests {
             (Sent, &[16, 0, 9, 0, 2, 4, 0, 1, 0, 2], "unit 7: write 2 registers from 9"),
             (Sent, &[43, 14], "unit 7: function 43"),
             (Received, &[1, 1, 5], "unit 7: 8 bits"),
+            (Sent, &[3, 0x28, 6, 0, 1], "unit 7: read 1 holding register from 10246"),
+            (Received, &[3, 2, 8, 0xFE], "unit 7: 1 register"),
             (Received, &[3, 4, 8, 0xFE, 0, 0], "unit 7: 2 registers"),
             (Received, &[5, 0, 3, 0xFF, 0], "unit 7: coil 3 written"),
             (Received, &[6, 0x20, 1, 0, 4], "unit 7: register 8193 written"),

@@ -293,6 +293,51 @@ async fn there_is_room_for_so_many_readers_of_the_stream() {
         .await;
 }
 
+/// Asks from that address of this machine, and waits for the first line of the answer.
+#[cfg(target_os = "linux")]
+async fn asked_from(bench: &Bench, address: &str, path: &str) -> (TcpStream, String) {
+    let socket = tokio::net::TcpSocket::new_v4().unwrap();
+    socket.bind(format!("{address}:0").parse().unwrap()).unwrap();
+    let mut stream = socket.connect(bench.gateway.address()).await.unwrap();
+    stream.write_all(format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n").as_bytes()).await.unwrap();
+    let mut line = vec![0; "HTTP/1.1 200".len()];
+    timeout(PATIENCE, stream.read_exact(&mut line)).await.expect("it is answered in time").unwrap();
+    (stream, String::from_utf8(line).unwrap())
+}
+
+#[cfg(target_os = "linux")]
+#[tokio::test(flavor = "multi_thread")]
+async fn one_client_cannot_have_every_place_of_the_stream() {
+    let bench = Bench::bound(|_| {}, Some(Limits { streams: 3, ..Limits::default() })).await;
+    let mut held = Vec::new();
+    for expected in ["200", "200", "200", "503"] {
+        let (stream, line) = asked_from(&bench, "127.0.0.1", "/api/v1/events").await;
+        assert_eq!(line, format!("HTTP/1.1 {expected}"));
+        held.push(stream);
+    }
+    let (_operator, line) = asked_from(&bench, "127.0.0.2", "/api/v1/events").await;
+    assert_eq!(line, "HTTP/1.1 200", "another one finds a place");
+    let oldest = rest(held.remove(0)).await;
+    assert!(!oldest.ends_with("0\r\n\r\n"), "broken off, so that its reader knows: {oldest}");
+    let (_, line) = asked_from(&bench, "127.0.0.2", "/api/v1/events").await;
+    assert_eq!(line, "HTTP/1.1 503", "two and one are fair enough");
+    keeps_its_pace(&bench).await;
+}
+
+#[cfg(target_os = "linux")]
+#[tokio::test(flavor = "multi_thread")]
+async fn one_client_cannot_have_every_connection() {
+    let limits = Limits { connections: 4, streams: 9, ..Limits::default() };
+    let bench = Bench::bound(|_| {}, Some(limits)).await;
+    let mut held = Vec::new();
+    for _ in 0..4 {
+        held.push(asked_from(&bench, "127.0.0.1", "/api/v1/events").await);
+    }
+    let (_operator, line) = asked_from(&bench, "127.0.0.2", "/api/v1/events").await;
+    assert_eq!(line, "HTTP/1.1 200");
+    keeps_its_pace(&bench).await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn answers_that_wait_do_not_fill_the_memory() {
     let bench = Bench::bound(|_| {}, Some(Limits { waiting_kib: 8, ..Limits::default() })).await;

@@ -62,7 +62,7 @@ fn every_mistake_has_its_place_and_remedy() {
         (
             &with("[[wires]]\nid = \"w\"\nendpoint = \"10.0.0.1:502\""),
             "site.toml:4:12: `10.0.0.1:502` is no endpoint: no scheme; write tcp://10.0.0.1:502 or another of \
-             tcp://HOST:502, rtu:///dev/ttyUSB0?baud=9600&parity=none&stop=1, rtu+tcp://HOST:502 or tls://HOST:802",
+             tcp://HOST:502, rtu:///dev/ttyUSB0?baud=9600&parity=none&stop=1 or rtu+tcp://HOST:502",
         ),
         (
             &with("[[wires]]\nid = \"w 1\"\nendpoint = \"tcp://h\""),
@@ -214,8 +214,18 @@ fn what_is_no_toml() {
         ("[site]\nname = South", "site.toml:2:8: this is not TOML: a text without quotes; put it in quotes"),
         (
             "[site]\nname = 1 South",
+            "site.toml:2:8: this is not TOML: a number with something behind it; put a text or a duration in quotes; \
+             behind a number nothing but a comment may follow",
+        ),
+        (
+            "[site]\nname = ",
             "site.toml:2:8: this is not TOML: string values must be quoted, expected literal string; mend the \
              syntax; https://toml.io shows it",
+        ),
+        (
+            "[site]\nname = “S”",
+            "site.toml:2:8: this is not TOML: quotes of a word processor; write straight ones, as in \"North \
+             hospital\"",
         ),
         (
             "[site]\nname = \"S\"\n[site]\n",
@@ -240,6 +250,31 @@ fn what_is_no_toml() {
     ] {
         let found = mistakes(text);
         assert_eq!(found, [expected], "{text}");
+    }
+}
+
+#[test]
+fn what_stands_without_quotes_is_told_what_it_was_meant_for() {
+    let of_wire = |line: &str| with(&format!("[[wires]]\nid = \"w\"\n{line}"));
+    let choice = "a yes or no in other words; write true or false, in small letters";
+    let behind = "a number with something behind it; put a text or a duration in quotes; behind a number nothing but a \
+                  comment may follow";
+    let text = "a text without quotes; put it in quotes";
+    for (key, value, expected) in [
+        ("trace", "True", choice),
+        ("trace", "FALSE", choice),
+        ("trace", "yes # please", choice),
+        ("trace", "off", choice),
+        ("trace", "truely", text),
+        ("timeout", "1s", behind),
+        ("timeout", "20 ms", behind),
+        ("unit", "1;", behind),
+        ("endpoint", "tcp://192.0.2.1", text),
+    ] {
+        assert_eq!(
+            mistakes(&of_wire(&format!("{key} = {value}"))),
+            [format!("site.toml:4:{}: this is not TOML: {expected}", key.len() + 4)]
+        );
     }
 }
 
