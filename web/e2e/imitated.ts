@@ -36,6 +36,11 @@ export class Imitated {
         const { states, ...whole } = told
         const events = [['snapshot', whole], ...states.map((state) => ['state', state])] as const
         for (const [name, data] of events) answer.write(`event: ${name}\ndata: ${JSON.stringify(data)}\n\n`)
+      } else if (path === '/api/v1/site') {
+        answer.writeHead(200, { 'content-type': 'application/json' })
+        answer.end(
+          JSON.stringify({ ...told.site, devices: told.devices, diagram: { nodes: [], connections: [] } }),
+        )
       } else if (path.endsWith('/points')) {
         answer.writeHead(200, { 'content-type': 'application/json' })
         answer.end(JSON.stringify(points))

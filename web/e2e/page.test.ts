@@ -307,7 +307,7 @@ test('a gateway that goes away is told within seconds, and it comes back by itse
 test.runIf(process.env.BUSBAR_SCREENSHOT === '1')(
   'the pictures of the README',
   async () => {
-    const page = await open('', { width: 940, height: 850 })
+    const page = await open('', { width: 1280, height: 850 })
     await overview(page)
     // The demonstration tells a story: the picture shows a genset at work, and an alarm.
     await page.waitForFunction(
@@ -318,6 +318,12 @@ test.runIf(process.env.BUSBAR_SCREENSHOT === '1')(
       { timeout: 300_000 },
     )
     await page.screenshot({ path: `${DOCS}screenshot.png`, fullPage: true })
+    await page.goto(demo.address + hashOf('genset-1'))
+    await page.getByRole('button', { name: 'Screen of the controller' }).click()
+    for (const part of ['The display', 'samples of', 'A bar for each harmonic'])
+      await page.getByRole('img', { name: part }).waitFor({ timeout: LINE_MS })
+    await expect.poll(() => page.getByLabel('Screen', { exact: true }).locator('text=?').count()).toBe(0)
+    await page.getByLabel('Screen', { exact: true }).screenshot({ path: `${DOCS}screen.png` })
     await page.setViewportSize({ width: 1280, height: 640 })
     await page.goto(`${demo.address}#/wires/line`)
     await page.getByRole('heading', { name: 'Wire line' }).waitFor()

@@ -97,7 +97,7 @@ describe.each(LOOKS)('on a %s', (...look) => {
     await page.getByText('As a table').click()
     const rows = page.getByRole('table').locator('tbody tr')
     expect(await rows.count()).toBe(15)
-    expect(await rows.first().innerText()).toMatch(/^3\s+\d+(\.\d+)? ?%/)
+    expect(await rows.first().innerText()).toMatch(/^3\s+\d+(\.\d+)?\s%/)
     expect(await overflow(page)).toBe(0)
     await page.screenshot({ path: `${SHOTS}screen-${name}-${scheme}.png`, fullPage: true })
 

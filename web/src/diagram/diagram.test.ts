@@ -31,8 +31,10 @@ function show(diagram: Diagram, live: Live, devices: string[] = []): void {
   flushSync()
 }
 
-const label = (selector: string) => document.querySelector(selector)?.getAttribute('aria-label')
-const list = () => [...document.querySelectorAll('li')].map((line) => line.textContent)
+const label = (selector: string) =>
+  document.querySelector(selector)?.getAttribute('aria-label')?.replaceAll('\u00a0', ' ')
+const list = () =>
+  [...document.querySelectorAll('li')].map((line) => line.textContent?.replaceAll('\u00a0', ' '))
 
 beforeEach(() => {
   vi.useFakeTimers({ now: START, toFake: ['Date', 'setTimeout', 'clearTimeout'] })
@@ -166,6 +168,12 @@ test('on the page the values come from the points that carry the signals, good o
   flushSync()
   expect(label('[data-connection]')).toBe('m to l: breaker open')
   expect(label('[data-node=l]')).toBe('l: dead')
+  gen.view = { ...gen.view, identity: { verdict: 'wrong', detail: null, checked: null } }
+  flushSync()
+  expect(label('[data-node=m]')).toBe('m: not known')
+  gen.view = device('g')
+  flushSync()
+  expect(label('[data-node=m]')).toBe('m: live, 230 V')
   page.stream.phase = 'lost'
   flushSync()
   expect(label('[data-node=m]')).toBe('m: not known')

@@ -1,6 +1,7 @@
 import { expect, test } from 'vitest'
-import { figuresOf, flowOf, loadedOf, positionOf, signalsOf } from './energy'
+import { figuresOf, flowOf, loadedOf, positionOf } from './energy'
 import { HOSPITAL, lines, node, values } from './fixtures'
+import { signalsOf } from './signals'
 import type { Diagram, Live, Reading } from './types'
 
 const NODES = [

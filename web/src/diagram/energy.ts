@@ -1,4 +1,5 @@
 // What is live: told by what is measured and by the breakers, unknown wherever a value is not good.
+import { FIGURES, LOADED, VOLTAGES } from './signals'
 import type { Connection, Diagram, DiagramNode, Live, Reading } from './types'
 
 export type Energy = 'live' | 'dead' | 'unknown'
@@ -18,32 +19,6 @@ export interface Flow {
 
 /** Below it a voltage is a remnant or a pick-up: the bound of extra-low voltage. */
 const LIVE_V = 50
-
-const VOLTAGES = ['voltage.average', 'l1.voltage', 'l2.voltage', 'l3.voltage', 'l1_l2.voltage']
-const FIGURES = {
-  source: [VOLTAGES, ['frequency'], ['power.active']],
-  compressor: [['discharge.pressure']],
-}
-const LOADED = 'loaded'
-
-/** The signals that the diagram shows or judges by, of each device. */
-export function signalsOf({ nodes, connections }: Diagram): Map<string, string[]> {
-  const wanted = new Map<string, Set<string>>()
-  const want = (device: string | null, signal: string) => {
-    if (device === null) return
-    const signals = wanted.get(device) ?? new Set()
-    wanted.set(device, signals.add(signal))
-  }
-  for (const node of nodes) for (const signal of measuredBy(node)) want(node.device, signal)
-  for (const { device, breaker } of connections) if (breaker !== null) want(device, breaker)
-  return new Map([...wanted].map(([device, signals]) => [device, [...signals]]))
-}
-
-function measuredBy({ kind, signals }: DiagramNode): string[] {
-  if (signals === null) return []
-  const parts = kind === 'compressor' ? [LOADED, ...FIGURES.compressor.flat()] : FIGURES.source.flat()
-  return parts.map((part) => `${signals}.${part}`)
-}
 
 function read({ device, signals }: DiagramNode, part: string, live: Live): Reading | undefined {
   return device === null || signals === null ? undefined : live.value(device, `${signals}.${part}`)

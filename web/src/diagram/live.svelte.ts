@@ -1,8 +1,9 @@
 // The values behind the diagram: which point carries which signal is asked for, what it reads now is on the page already.
+import { isWrong } from '../logic/fleet'
 import { standing } from '../logic/quality'
 import type { PointsView, PointView } from '../logic/types'
 import type { Page } from '../state/page.svelte'
-import { signalsOf } from './energy'
+import { signalsOf } from './signals'
 import type { Diagram, Live, Reading } from './types'
 
 /** The point of a signal, and its bit where it is a flag. */
@@ -24,6 +25,8 @@ export class SiteLive implements Live {
 
   /** Asks every device of the diagram which points carry what it shows, until told or stopped. */
   async start(diagram: Diagram, stop: AbortSignal): Promise<void> {
+    // After a reload the same id may be another controller.
+    this.#carriers = {}
     await Promise.all([...signalsOf(diagram)].map(([device, signals]) => this.#ask(device, signals, stop)))
   }
 
@@ -34,10 +37,13 @@ export class SiteLive implements Live {
     const carrier = carriers.get(signal)
     if (!carrier) return undefined
     const { point, bit } = carrier
-    const view = this.#page.site.device(device)?.cell(point.id).view
+    const known = this.#page.site.device(device)
+    // What another device says is nothing about this one.
+    if (!known || isWrong(known.view)) return { value: null, unit: null, look: 'unread' }
+    const { view, decimals } = known.cell(point.id)
     const { look } = standing(view, undefined, 0, this.#page.live)
     if (bit !== undefined) return { value: view?.set?.includes(bit) ?? null, unit: null, look }
-    return { value: typeof view?.value === 'number' ? view.value : null, unit: point.unit, look }
+    return { value: typeof view?.value === 'number' ? view.value : null, unit: point.unit, look, decimals }
   }
 
   async #ask(device: string, signals: readonly string[], stop: AbortSignal): Promise<void> {

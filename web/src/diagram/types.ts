@@ -17,6 +17,8 @@ export interface Reading {
   value: number | boolean | null
   unit: string | null
   look: Look
+  /** How many decimals it has at most, where that is known. */
+  decimals?: number
 }
 
 /** The values as they are now; undefined for a signal that the device does not have. */

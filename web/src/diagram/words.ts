@@ -1,5 +1,5 @@
 // The diagram in words: beside its symbols, for a screen reader, and as a list.
-import { numberText, unitText } from '../logic/format'
+import { units } from '../view/units.svelte'
 import { figuresOf, loadedOf, type Energy, type Flow, type Position } from './energy'
 import type { Diagram, DiagramNode, Live, Reading } from './types'
 
@@ -12,8 +12,8 @@ export const POSITION: Record<Position, string> = {
 }
 
 /** A number with its unit; nothing where it is not good, for that nobody would see here. */
-export function figureText({ value, unit, look }: Reading): string {
-  return look === 'good' && typeof value === 'number' ? `${numberText(value)} ${unitText(unit)}`.trim() : ''
+export function figureText({ value, unit, look, decimals }: Reading): string {
+  return look === 'good' && typeof value === 'number' ? units.text(value, unit, decimals) : ''
 }
 
 /** The numbers beside a node. */

@@ -16,13 +16,19 @@ export function ratedOf(
   { power_kw: power, tank_l: tank, battery_v: nominal }: DeviceView['nameplate'],
 ): Rated | undefined {
   if (signal === 'genset.power.active' && power)
-    return { text: `${Math.round((value / power) * 100)} % of ${power} kW`, share: within(value / power) }
+    return {
+      text: `${Math.round((value / power) * 100)}\u00a0% of ${power}\u00a0kW`,
+      share: within(value / power),
+    }
   if (signal === 'fuel.level' && tank)
-    return { text: `about ${Math.round((value / 100) * tank)} L of ${tank} L`, share: within(value / 100) }
+    return {
+      text: `about ${Math.round((value / 100) * tank)}\u00a0L of ${tank}\u00a0L`,
+      share: within(value / 100),
+    }
   if (signal === 'battery.voltage' && nominal)
     return value < nominal
-      ? { text: `below ${nominal} V nominal`, low: true }
-      : { text: `of ${nominal} V nominal` }
+      ? { text: `below ${nominal}\u00a0V nominal`, low: true }
+      : { text: `of ${nominal}\u00a0V nominal` }
   return undefined
 }
 

@@ -19,16 +19,21 @@ export class Page {
   hidden = $state(document.hidden)
 
   #api = apiOf(document.baseURI)
-  #signals = new Set(cardSignals())
+  #signals: Set<string>
   #open: (address: string) => Source
 
-  /** `early` is a stream that was opened before this page was there, `cards` what the document knows of the points. */
+  /**
+   * `early` is a stream that was opened before this page was there, `cards` what the document knows of the points,
+   * `signals` what the first stream asks for.
+   */
   constructor(
     open: (address: string) => Source = (address) => new EventSource(address),
     early?: Early,
     cards: Record<string, PointsView> = {},
+    signals: Iterable<string> = cardSignals(),
   ) {
     this.#open = open
+    this.#signals = new Set(signals)
     this.site = new Site(cards)
     let waiting = early
     this.stream = new Stream(

@@ -54,8 +54,10 @@ export class Device {
   #cells = new Map<string, Cell>()
   #groups = $state.raw<readonly GroupView[]>()
   #glance = $state.raw<readonly Tile[]>()
-  /** The points and joined signals that the stream of all devices keeps up to date. */
-  #shared = new Set<string>()
+  /** What the stream of all devices told last: it holds again when the device's own stream is gone. */
+  #shared = new Told()
+  /** The last round that brought something else than failures. */
+  #answered = $state<number>()
 
   constructor(view: DeviceView) {
     this.view = view
@@ -95,7 +97,7 @@ export class Device {
   /** The last sign of life. While a device answers, its rounds carry it; a round that failed is none. */
   get seenAt(): number | undefined {
     const { online, last_seen } = this.view
-    const times = [timeOf(last_seen), ...(online ? [this.rounds.fast, this.rounds.slow] : [])]
+    const times = [timeOf(last_seen), online ? this.#answered : undefined]
     return times.reduce((a, b) => (a === undefined || (b !== undefined && b > a) ? b : a), undefined)
   }
 
@@ -112,8 +114,16 @@ export class Device {
 
   /** Everything that the stream of all devices tells of its values. */
   share({ values, joined }: StateEvent): void {
-    this.#shared = new Set([...values.map(({ id }) => id), ...joined.map(({ signal }) => signal)])
+    this.#shared = new Told()
+    this.#shared.take(values, joined)
     if (!this.followed) this.#whole(values, joined)
+  }
+
+  /** A round that the stream of all devices tells of. */
+  shareRound(event: ValuesEvent): void {
+    this.#shared.take(event.changed, event.joined)
+    this.#shared.rounds = { ...this.#shared.rounds, ...roundOf(event) }
+    if (!this.followed) this.round(event)
   }
 
   /** What its own stream tells: its values. The other stream has the rest. */
@@ -127,24 +137,34 @@ export class Device {
 
   /** Its own stream is gone: what the other one does not tell is not kept up to date any more, and must look so. */
   unfollow(): void {
+    if (!this.followed) return
     this.followed = false
+    const { values, joined, rounds } = this.#shared
     for (const [id, cell] of this.#cells) {
-      if (cell.view && !this.#shared.has(id)) cell.set(outdated(cell.view))
+      // Its own stream may have ended before it told what the other has told already, and tells once.
+      const view = values.get(id) ?? (cell.view && outdated(cell.view))
+      if (view) cell.set(view)
     }
     for (const [signal, view] of Object.entries(this.whole)) {
-      if (!this.#shared.has(signal)) this.whole[signal] = outdated(view)
+      this.whole[signal] = joined.get(signal) ?? outdated(view)
     }
+    this.rounds = rounds
   }
 
   #whole(values: readonly ValueView[], joined: readonly JoinedView[]): void {
     this.rounds = {}
+    this.#answered = undefined
     this.take(values, joined)
   }
 
   /** The last finished round of a rate and what it changed. */
-  round({ rate, ts, changed, joined }: ValuesEvent): void {
-    const read = timeOf(ts)
-    if (read !== undefined) this.rounds[rate] = read
+  round(event: ValuesEvent): void {
+    const { changed, joined } = event
+    Object.assign(this.rounds, roundOf(event))
+    // That a device is not heard any more is told after the values which say so.
+    if (changed.length === 0 || changed.some(({ quality }) => quality !== 'bad')) {
+      this.#answered = Math.max(this.#answered ?? 0, timeOf(event.ts) ?? 0) || undefined
+    }
     this.take(changed, joined)
   }
 
@@ -152,6 +172,23 @@ export class Device {
     for (const value of values) this.cell(value.id).set(value)
     for (const value of joined) this.whole[value.signal] = value
   }
+}
+
+/** Values, joined signals and rounds as they were told last. */
+class Told {
+  values = new Map<string, ValueView>()
+  joined = new Map<string, JoinedView>()
+  rounds: Partial<Record<Rate, number>> = {}
+
+  take(values: readonly ValueView[], joined: readonly JoinedView[]): void {
+    for (const value of values) this.values.set(value.id, value)
+    for (const value of joined) this.joined.set(value.signal, value)
+  }
+}
+
+function roundOf({ rate, ts }: ValuesEvent): Partial<Record<Rate, number>> {
+  const read = timeOf(ts)
+  return read === undefined ? {} : { [rate]: read }
 }
 
 function outdated<View extends ValueView | JoinedView>(view: View): View {
@@ -186,8 +223,7 @@ export class Site {
       }
       case 'values': {
         const values = payload as ValuesEvent
-        const device = this.device(values.device)
-        return device?.followed ? undefined : device?.round(values)
+        return this.device(values.device)?.shareRound(values)
       }
       case 'device':
         return this.#device(payload as DeviceView)

@@ -110,9 +110,12 @@ describe('a device with a stream of its own', () => {
     const site = started()
     const gen1 = site.device('gen1')!
     gen1.follow('state', all)
+    // Told by the other while its own was on the way still.
+    site.apply('values', round(232))
     gen1.unfollow()
     expect(gen1.cell('oil').view).toMatchObject({ value: 4.2, quality: 'stale' })
-    expect(gen1.cell('volts').view?.quality).toBe('good')
+    expect(gen1.cell('volts').view).toMatchObject({ value: 232, quality: 'good' })
+    expect(gen1.cell('amps').view?.value).toBe(12)
     site.apply('values', round(235))
     expect(gen1.cell('volts').view?.value).toBe(235)
   })
@@ -165,6 +168,13 @@ describe('values', () => {
     site.apply('device', device('gen1', { online: false, last_seen: stamp(2) }))
     site.apply('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(30), changed: [] })
     expect(gen1.seenAt).toBe(START + 2000)
+    site.apply('device', device('gen1', { online: false, last_seen: null }))
+    expect(gen1.seenAt).toBeUndefined()
+    // The values say it before the device does.
+    site.apply('device', device('gen1', { online: true, last_seen: stamp(2) }))
+    const bad = value('volts', null, { quality: 'bad', error: 'no answer' })
+    site.apply('values', { device: 'gen1', joined: [], rate: 'fast', ts: stamp(33), changed: [bad] })
+    expect(gen1.seenAt).toBe(START + 30_000)
     site.apply('device', device('gen1', { online: false, last_seen: null }))
     expect(gen1.seenAt).toBeUndefined()
   })

@@ -54,6 +54,15 @@ export class Early implements Source {
   }
 }
 
+/** What the gateway wrote into the document under this id; undefined where it wrote nothing. */
+export function written(id: string): unknown {
+  try {
+    return JSON.parse(document.getElementById(id)?.textContent ?? '') as unknown
+  } catch {
+    return undefined
+  }
+}
+
 /** Where the events are: `api` is the API's own address, `query` what is asked for. */
 export function eventsAt(api: URL, query: Record<string, string | undefined>): string {
   const address = new URL('events', api)

@@ -75,7 +75,7 @@ export class Stream {
   /** Asks for everything anew, because something else is asked for than before. */
   renew(): void {
     this.#last = undefined
-    this.connect()
+    this.#doubt()
   }
 
   /** The page came back to the foreground or the network returned: the timers may have slept. */
@@ -127,7 +127,7 @@ export class Stream {
     else this.#after(this.#patience(), () => this.#doubt())
   }
 
-  /** Nothing was heard for too long. Either there was nothing to say, or the connection is dead without a sign. */
+  /** Opens it anew, and until that answers nobody knows for long whether what is shown still holds. */
   #doubt(): void {
     this.connect()
     this.#after(DOUBT_MS, () => {

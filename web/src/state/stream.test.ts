@@ -186,6 +186,10 @@ describe('a stream that is opened again', () => {
     stream.renew()
     expect(last().after).toBeUndefined()
     expect(stream.phase).toBe('live')
+    later(1000)
+    expect(stream.phase).toBe('connecting')
+    open()
+    expect(stream.phase).toBe('live')
   })
 
   test('begins anew where somebody was told that it is gone', () => {

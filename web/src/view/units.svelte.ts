@@ -13,6 +13,12 @@ class Units {
   show(value: number, unit: string | null | undefined, decimals?: number): Shown {
     return shown(value, unit, this.choice, decimals)
   }
+
+  /** The same in one piece, which no line end parts. */
+  text(value: number, unit: string | null | undefined, decimals?: number): string {
+    const { number, unit: print } = this.show(value, unit, decimals)
+    return print ? `${number}\u00a0${print}` : number
+  }
 }
 
 export const units = new Units()

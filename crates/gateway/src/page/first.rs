@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use jiff::Timestamp;
+use serde::Serialize;
 
 use super::tiles::{self, Tile};
 use crate::api::types::{AlarmView, Class, Kind, PointsView, Quality, WireState};
@@ -12,6 +13,9 @@ use crate::hub::Hub;
 
 /// Most devices whose values are in the document: on a slow line every one of them costs a part of a second.
 const MOST: usize = 24;
+
+/// Most devices with which the page draws the diagram unasked, so that its first stream asks for what that shows.
+const DRAWN: usize = 12;
 
 /// Text as HTML, in content and in quotes.
 struct Escaped<'a>(&'a str);
@@ -40,11 +44,19 @@ pub(super) fn html(hub: &Hub, now: Timestamp) -> String {
     let mut out = String::with_capacity(16 * 1024);
     // Writing to a string cannot fail.
     let _ = site(&mut out, hub, now);
-    out.push_str("<script type=\"application/json\" id=\"cards\">");
-    // A text in it must not end the element.
-    out.push_str(&serde_json::to_string(&cards(hub)).unwrap_or_default().replace('<', "\\u003c"));
-    out.push_str("</script>");
+    data(&mut out, "cards", &cards(hub));
+    let table = hub.table();
+    if !table.diagram.nodes.is_empty() && table.devices.len() <= DRAWN {
+        data(&mut out, "diagram", &table.diagram);
+    }
     out
+}
+
+/// What the page reads, under the id by which it finds it.
+fn data(out: &mut String, id: &str, what: &impl Serialize) {
+    // A text in it must not end the element.
+    let json = serde_json::to_string(what).unwrap_or_default().replace('<', "\\u003c");
+    let _ = write!(out, "<script type=\"application/json\" id=\"{id}\">{json}</script>");
 }
 
 /// What the cards show, by profile, so that the page need not ask for each device.
@@ -239,6 +251,25 @@ mod tests {
         assert_eq!(html.matches("<h2>").count(), MOST);
         assert!(html.contains("<p>and 16 more</p>") && html.contains("0 of 40"), "{html}");
         assert_eq!(html.matches("\"tiny\":").count(), 1, "a profile once");
+    }
+
+    #[test]
+    fn the_page_learns_how_the_site_is_connected() {
+        use crate::api::types::{DiagramView, NodeKind, NodeView};
+        let of = |ids: &[&str]| {
+            let name = "</script><b>".to_owned();
+            let node =
+                NodeView { id: "n".to_owned(), kind: NodeKind::Bus, name, device: None, signals: None };
+            let diagram = DiagramView { nodes: vec![node], connections: vec![] };
+            html(&Hub::new(Table { diagram, ..table(ids) }, stop::channel().1), now())
+        };
+        let html = of(&["gen1"]);
+        let (_, json) = html.split_once("id=\"diagram\">").unwrap();
+        let diagram: serde_json::Value =
+            serde_json::from_str(json.strip_suffix("</script>").unwrap()).unwrap();
+        assert_eq!(diagram["nodes"][0]["name"], "</script><b>");
+        let many: Vec<String> = (0..=DRAWN).map(|id| format!("gen{id}")).collect();
+        assert!(!of(&many.iter().map(String::as_str).collect::<Vec<_>>()).contains("id=\"diagram\""));
     }
 
     #[test]
