@@ -203,7 +203,7 @@ test('the harmonics: a bar each, the numbers in a table, no bar for what is not 
   )!
   expect(part.querySelectorAll('rect')).toHaveLength(1)
   expect(part.querySelector('[role=img]')?.getAttribute('aria-label')).toContain(
-    'The highest is harmonic 3 with 0.45 %.',
+    'The highest is harmonic 3 with 0.45\u00a0%.',
   )
   const rows = [...part.querySelectorAll('tbody tr')].map((row) =>
     [...row.children].map((cell) => cell.textContent?.replace(/\s+/g, ' ').trim()),

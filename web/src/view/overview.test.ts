@@ -48,6 +48,7 @@ beforeEach(() => {
   vi.useFakeTimers({ now: START + 2000, toFake: ['Date', 'setTimeout', 'clearTimeout'] })
   const groups = [group('Genset', [point('kw', { signal: 'genset.power.active', unit: 'kW' })])]
   vi.stubGlobal('fetch', async (address: URL) => {
+    if (address.pathname.endsWith('/site')) return Response.json({ diagram: { nodes: [], connections: [] } })
     asked.push(address.pathname + address.search)
     return Response.json({ groups, joined: [] })
   })
