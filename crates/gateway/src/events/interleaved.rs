@@ -44,7 +44,8 @@ async fn listen(hub: Arc<Hub>, patience: usize, comes_back: bool) {
             }
             _ => {}
         }
-        heard += 1;
+        // To be let in again is no news.
+        heard += usize::from(event.name != "resumed");
         // Who goes in the middle of a state knows but a part of it.
         if heard >= patience && event.id.is_some() {
             (heard, is_back) = (0, comes_back);
