@@ -98,6 +98,16 @@ impl Bank {
         }
     }
 
+    /// Lets a point follow the panel again; false where it was not pinned.
+    pub(crate) fn unpin(&mut self, index: usize) -> bool {
+        self.pinned.get_mut(index).is_some_and(std::mem::take)
+    }
+
+    /// The points that are pinned, by index in the profile.
+    pub(crate) fn pinned(&self) -> impl Iterator<Item = usize> {
+        (0..).zip(&self.pinned).filter(|(_, pinned)| **pinned).map(|(index, _)| index)
+    }
+
     /// Fills the bytes that mean nothing anew: whoever takes them for a part of the value shall notice.
     pub(crate) fn stir(&mut self, random: &mut Random) {
         for place in &self.hollow {

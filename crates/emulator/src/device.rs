@@ -9,11 +9,14 @@ use crate::bank::Bank;
 use crate::config::Config;
 use crate::datakom_d::DatakomD;
 use crate::datakom_dkg705::DatakomDkg705;
-use crate::error::StartError;
+use crate::error::{PinError, StartError};
+use crate::inject::{self, Alarm, InjectError};
+use crate::levers::{Lever, LeverError, Position};
 use crate::panel::Panel;
 use crate::pins;
 use crate::random::Random;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
+use crate::settings::{SettingError, Settings};
 use crate::smartgen_acc1700::{Acc1700, Model};
 use crate::smartgen_hat821si::Hat821si;
 
@@ -32,6 +35,9 @@ pub struct Device {
     bank: Bank,
     refusals: Refusals,
     panel: Box<dyn Panel>,
+    settings: Settings,
+    /// Alarms that were injected, by point and bit.
+    injected: Vec<Alarm>,
     clock: Duration,
     seed: u64,
     answer_delay: Duration,
@@ -49,16 +55,31 @@ impl Device {
         if !(range.min..=range.max).contains(&config.unit) {
             return Err(StartError::Unit { unit: config.unit, min: range.min, max: range.max });
         }
-        let panel = panel(profile, config)?;
-        let mut bank = Bank::new(profile);
-        for (point, text) in &config.pins {
-            let (index, registers) = pins::parse(profile, point, text)?;
+        let mut panel = panel(profile, config)?;
+        let (mut bank, mut settings) = (Bank::new(profile), Settings::of(profile));
+        for (name, text) in &config.pins {
+            if profile.setting(name).is_some() {
+                settings.set(name, text)?;
+                continue;
+            }
+            let (index, registers) = pins::parse(profile, name, text)?;
             bank.pin(index, &registers);
         }
+        panel.configure(&settings);
         panel.render(&mut bank);
         let answer_delay = profile.wire.answer_delay();
         let (unit, seed, refusals) = (config.unit, config.seed, panel.refusals());
-        let mut device = Self { unit, bank, refusals, panel, clock: Duration::ZERO, seed, answer_delay };
+        let mut device = Self {
+            unit,
+            bank,
+            refusals,
+            panel,
+            settings,
+            injected: Vec::new(),
+            clock: Duration::ZERO,
+            seed,
+            answer_delay,
+        };
         device.stir();
         Ok(device)
     }
@@ -138,6 +159,101 @@ impl Device {
     /// The registers as a read of any length would see them; `None` where one of them cannot be read.
     pub fn registers(&self, address: u16, count: u16) -> Option<&[u16]> {
         self.bank.read(address, count)
+    }
+
+    /// Simulated time since power-on, in whole steps.
+    pub fn time(&self) -> Duration {
+        self.clock
+    }
+
+    /// What can be made to happen to its plant.
+    pub fn levers(&self) -> &'static [Lever] {
+        self.panel.levers()
+    }
+
+    /// Where a lever stands; none where the plant has no such lever.
+    pub fn lever(&self, id: &str) -> Option<Position> {
+        self.panel.lever(id)
+    }
+
+    /// Pulls a lever to a position given as text. What follows from it is seen from the next step on.
+    ///
+    /// # Errors
+    /// The plant has no such lever, or the lever no such position.
+    pub fn pull(&mut self, id: &str, to: &str) -> Result<(), LeverError> {
+        let levers = self.levers();
+        let Some(lever) = levers.iter().find(|lever| lever.id == id) else {
+            let known: Vec<_> = levers.iter().map(|lever| lever.id).collect();
+            let nearest = busbar_profile::nearest(id, known.iter().copied());
+            return Err(LeverError::Unknown { id: id.to_owned(), nearest, known });
+        };
+        self.panel.pull(lever.id, lever.position(to)?);
+        Ok(())
+    }
+
+    /// Every alarm that the controller has.
+    pub fn alarms(&self) -> impl Iterator<Item = Alarm> + use<> {
+        inject::alarms(self.profile())
+    }
+
+    /// The alarms that are injected, in the order in which they were.
+    pub fn injected(&self) -> &[Alarm] {
+        &self.injected
+    }
+
+    /// Makes the panel take an alarm for active whatever the plant says, or no longer. Named by the id of its bit, or by
+    /// `point.bit` where several points have one.
+    ///
+    /// # Errors
+    /// There is no such alarm, there are several, or it follows from others.
+    pub fn inject(&mut self, name: &str, active: bool) -> Result<(), InjectError> {
+        let alarm = inject::find(self.profile(), name)?;
+        if !self.panel.inject(alarm.point, alarm.bit, active) {
+            return Err(InjectError::Derived { name: name.to_owned() });
+        }
+        self.injected.retain(|known| *known != alarm);
+        if active {
+            self.injected.push(alarm);
+        }
+        Ok(())
+    }
+
+    /// Keeps a point at a value given as text, as `--set` does.
+    ///
+    /// # Errors
+    /// The controller has no such point, or the point cannot have that value.
+    pub fn pin(&mut self, point: &str, text: &str) -> Result<(), PinError> {
+        let (index, registers) = pins::parse(self.profile(), point, text)?;
+        self.bank.pin(index, &registers);
+        self.panel.render(&mut self.bank);
+        Ok(())
+    }
+
+    /// Lets a point follow the plant again; false where it was not pinned.
+    pub fn unpin(&mut self, point: &str) -> bool {
+        let unpinned = self.profile().point_index(point).is_some_and(|index| self.bank.unpin(index));
+        self.panel.render(&mut self.bank);
+        unpinned
+    }
+
+    /// The points that are pinned, by index in the profile.
+    pub fn pinned(&self) -> impl Iterator<Item = usize> {
+        self.bank.pinned()
+    }
+
+    /// Timers, thresholds and attempts, each with what it is set to.
+    pub fn settings(&self) -> impl Iterator<Item = (&'static busbar_profile::Setting, f64)> {
+        self.settings.iter()
+    }
+
+    /// Sets one of them, in its unit.
+    ///
+    /// # Errors
+    /// The controller has no such setting, or it cannot be set to that.
+    pub fn set(&mut self, id: &str, text: &str) -> Result<(), SettingError> {
+        self.settings.set(id, text)?;
+        self.panel.configure(&self.settings);
+        Ok(())
     }
 
     /// The profile that it follows.

@@ -5,6 +5,8 @@ use std::io;
 use busbar_link::{Endpoint, SerialError};
 use busbar_profile::{Number, SerialSettings};
 
+use crate::settings::SettingError;
+
 /// An imitation was not started; nothing is left running.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -50,6 +52,9 @@ pub enum StartError {
     /// A value was pinned that its point cannot have.
     #[error(transparent)]
     Pin(#[from] PinError),
+    /// The controller was to be set to something that it cannot be set to.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// Nothing was given to imitate.
     #[error("there is no controller to imitate; name at least one")]
     NoController,

@@ -3,6 +3,7 @@
 //! From the inside out:
 //! - the plant (mains, genset, load, tank) is stepped by a simulated clock and a seed;
 //! - a panel reads it, drives it, and stores every documented register through the profile;
+//! - levers and injected alarms make things happen, as the grid, wear or a person would;
 //! - [`Device`] puts the wire rules in front: requests in, responses out, no I/O;
 //! - [`start`] gives a device sockets, serial lines and a clock; [`start_together`] puts several on one wire.
 
@@ -12,13 +13,16 @@ mod datakom_d;
 mod datakom_dkg705;
 mod device;
 mod error;
+mod inject;
 mod lcd;
+mod levers;
 mod panel;
 mod pins;
 mod plant;
 mod random;
 mod rules;
 mod server;
+mod settings;
 mod smartgen_acc1700;
 mod smartgen_hat821si;
 mod waveform;
@@ -26,7 +30,10 @@ mod waveform;
 pub use config::Config;
 pub use device::{Device, STEP};
 pub use error::{PinError, PinProblem, StartError};
+pub use inject::{Alarm, InjectError};
+pub use levers::{Lever, LeverError, Numbers, Position, Word};
 pub use server::{Emulation, Statistics, start, start_together};
+pub use settings::SettingError;
 
 /// The fastest simulated clock: an hour a second.
 pub const MAX_SPEED: f64 = 3600.0;

@@ -4,7 +4,9 @@ use std::fmt::Debug;
 use std::time::Duration;
 
 use crate::bank::Bank;
+use crate::levers::{Lever, Position};
 use crate::rules::Refusals;
+use crate::settings::Settings;
 
 /// One controller family, with the plant that it controls.
 pub(crate) trait Panel: Debug + Send {
@@ -28,4 +30,25 @@ pub(crate) trait Panel: Debug + Send {
 
     /// The maker's exception codes.
     fn refusals(&self) -> Refusals;
+
+    /// Takes timers, thresholds and attempts: at power-on, and again whenever one of them was set.
+    fn configure(&mut self, _settings: &Settings) {}
+
+    /// What can be made to happen here, in the order in which people are shown it.
+    fn levers(&self) -> &'static [Lever] {
+        &[]
+    }
+
+    /// Where one of its levers stands.
+    fn lever(&self, _id: &str) -> Option<Position> {
+        None
+    }
+
+    /// Pulls one of its levers to a position that it has.
+    fn pull(&mut self, _id: &str, _to: Position) {}
+
+    /// Takes an alarm for active, whatever the plant says, or no longer. False where that alarm follows from others.
+    fn inject(&mut self, _point: &str, _bit: u16, _active: bool) -> bool {
+        false
+    }
 }

@@ -163,6 +163,36 @@ pub(crate) struct ProfileFile {
     /// Remote commands.
     #[serde(default)]
     pub(crate) commands: Vec<At<CommandFile>>,
+    /// How an imitation of the controller behaves.
+    #[serde(default)]
+    pub(crate) emulator: EmulatorFile,
+}
+
+/// How an imitation of the controller behaves.
+#[derive(Debug, Default, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct EmulatorFile {
+    /// Timers, thresholds and numbers of attempts, as they are set where nobody says otherwise.
+    #[serde(default)]
+    pub(crate) settings: Vec<At<SettingFile>>,
+}
+
+/// A timer, a threshold or a number of attempts.
+#[derive(Debug, serde::Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SettingFile {
+    /// Its id, unique among the settings and the points.
+    pub(crate) id: At<String>,
+    /// What it is called.
+    pub(crate) name: String,
+    /// What it is set to.
+    pub(crate) value: At<Decimal>,
+    /// The least that it can be set to.
+    pub(crate) min: At<Decimal>,
+    /// The most that it can be set to.
+    pub(crate) max: At<Decimal>,
+    /// Unit of all three; none for a count or a choice of yes (1) and no (0).
+    pub(crate) unit: Option<String>,
 }
 
 /// The manual that the facts come from.

@@ -53,7 +53,8 @@ pub use joined::{Joined, JoinedParts, JoinedReading, JoinedValue};
 pub use number::{Number, ParseNumberError, Scale};
 pub use point::{Bit, Choice, Clear, Point};
 pub use profile::{
-    Coil, ExceptionName, Group, Identity, IdentityModel, Manual, Profile, SerialSettings, UnitRange, Wire,
+    Coil, ExceptionName, Group, Identity, IdentityModel, Manual, Profile, SerialSettings, Setting, UnitRange,
+    Wire,
 };
 pub use reading::{Reading, Shown, decode_window, no_reading, reading};
 pub use schema::json_schema;

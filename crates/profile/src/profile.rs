@@ -41,6 +41,8 @@ pub struct Profile {
     pub coils: Vec<Coil>,
     /// Remote commands.
     pub commands: Vec<Command>,
+    /// What an imitation of the controller is set to, in the order of the file.
+    pub settings: Vec<Setting>,
     pub(crate) by_id: HashMap<String, usize>,
     pub(crate) joined: Vec<Joined>,
     pub(crate) outline: Arc<Outline>,
@@ -66,6 +68,11 @@ impl Profile {
     /// Where the point of that id stands in `points`.
     pub fn point_index(&self, id: &str) -> Option<usize> {
         self.by_id.get(id).copied()
+    }
+
+    /// The setting of an imitation with this id.
+    pub fn setting(&self, id: &str) -> Option<&Setting> {
+        self.settings.iter().find(|setting| setting.id == id)
     }
 
     /// The command of that id.
@@ -269,6 +276,24 @@ pub struct Coil {
     pub name: String,
     /// Page of the manual.
     pub page: Option<u16>,
+}
+
+/// A timer, a threshold or a number of attempts of an imitated controller.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Setting {
+    /// Its id, unique among the settings and the points of the profile.
+    pub id: String,
+    /// What it is called.
+    pub name: String,
+    /// What it is set to where nobody says otherwise.
+    pub value: Number,
+    /// The least that it can be set to.
+    pub min: Number,
+    /// The most that it can be set to.
+    pub max: Number,
+    /// Unit of all three; none for a count, or for yes (1) and no (0).
+    pub unit: Option<String>,
 }
 
 #[cfg(test)]

@@ -21,8 +21,9 @@ mod story;
 use std::time::Duration;
 
 use crate::bank::Bank;
+use crate::levers::{Lever, Position};
 use crate::panel::Panel;
-use crate::plant::{Controls, Plant, Tank};
+use crate::plant::{self, Controls, Plant, Tank};
 use crate::random::Random;
 use crate::rules::Refusals;
 use crate::waveform::Distortion;
@@ -288,6 +289,18 @@ impl Panel for DatakomD {
             // Decimal 10: the manual's own meaning, write protection.
             protected: ExceptionCode(10),
         }
+    }
+
+    fn levers(&self) -> &'static [Lever] {
+        plant::LEVERS
+    }
+
+    fn lever(&self, id: &str) -> Option<Position> {
+        self.plant.lever(id)
+    }
+
+    fn pull(&mut self, id: &str, to: Position) {
+        self.plant.pull(id, to);
     }
 }
 

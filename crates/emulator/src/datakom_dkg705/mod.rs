@@ -37,8 +37,9 @@ use busbar_modbus::ExceptionCode;
 use busbar_profile::DateTime;
 
 use crate::bank::Bank;
+use crate::levers::{Lever, Position};
 use crate::panel::Panel;
-use crate::plant::{Controls, Plant, Tank};
+use crate::plant::{self, Controls, Plant, Tank};
 use crate::random::Random;
 use crate::rules::Refusals;
 
@@ -276,5 +277,17 @@ impl Panel for DatakomDkg705 {
             // Decimal 10: the manual's own meaning, write protection.
             protected: ExceptionCode(10),
         }
+    }
+
+    fn levers(&self) -> &'static [Lever] {
+        plant::LEVERS
+    }
+
+    fn lever(&self, id: &str) -> Option<Position> {
+        self.plant.lever(id)
+    }
+
+    fn pull(&mut self, id: &str, to: Position) {
+        self.plant.pull(id, to);
     }
 }

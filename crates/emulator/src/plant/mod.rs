@@ -8,12 +8,14 @@ mod compressor;
 mod electrical;
 mod engine;
 mod exhaust;
+mod levers;
 mod parallel;
 mod supplies;
 
 pub(crate) use compressor::{Compressor, Orders};
 pub(crate) use electrical::{Energy, Feed};
 pub(crate) use engine::Engine;
+pub(crate) use levers::LEVERS;
 pub(crate) use parallel::Regulation;
 pub(crate) use supplies::{Battery, Tank};
 

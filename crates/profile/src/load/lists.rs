@@ -118,7 +118,7 @@ impl Check<'_> {
         }
     }
 
-    fn twice(&mut self, span: &Range<usize>, what: &str) {
+    pub(super) fn twice(&mut self, span: &Range<usize>, what: &str) {
         self.note(span, format!("{what} is there twice in this list"), "correct one of the two");
     }
 

@@ -8,6 +8,7 @@ mod lint;
 mod lists;
 mod points;
 mod scale;
+mod settings;
 mod shape;
 mod vocabulary;
 mod wire;
@@ -17,6 +18,7 @@ use std::sync::Arc;
 
 use crate::file::{
     At, BitFile, ChoiceFile, CoilFile, CommandFile, GroupFile, JoinedFile, PointFile, ProfileFile,
+    SettingFile,
 };
 use crate::findings::{Collector, Findings};
 use crate::image::Outline;
@@ -39,6 +41,7 @@ const PRUNES: &[shape::Prune] = &[
     |table, collector| shape::prune::<JoinedFile>(table, &["joined"], collector),
     |table, collector| shape::prune::<CoilFile>(table, &["coils"], collector),
     |table, collector| shape::prune::<CommandFile>(table, &["commands"], collector),
+    |table, collector| shape::prune::<SettingFile>(table, &["emulator", "settings"], collector),
 ];
 
 /// Reads and checks a profile.
@@ -56,6 +59,7 @@ pub(crate) fn parse(file_name: &str, text: &str, vocabulary: &Vocabulary) -> Res
     let coils = check.coils();
     let joined = check.joined(&layout);
     let commands = check.commands(&layout, &joined, wire.as_ref());
+    let settings = check.settings();
     let Check { collector, .. } = check;
     let (Some(wire), true) = (wire, collector.is_empty()) else {
         return Err(collector.into_findings());
@@ -74,6 +78,7 @@ pub(crate) fn parse(file_name: &str, text: &str, vocabulary: &Vocabulary) -> Res
         points,
         coils,
         commands,
+        settings,
         by_id: by_id.into_iter().filter_map(|(id, index)| Some((id, index?))).collect(),
         joined,
         outline,
