@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod acc1700;
+mod datakom_d;
 mod dkg705;
 mod golden;
 mod hat821si;
