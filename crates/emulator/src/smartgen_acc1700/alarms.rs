@@ -89,8 +89,9 @@ impl Alarms {
                 word.caused &= !(1 << bit);
             }
         });
-        for word in &mut self.words {
-            word.latched = 0;
+        for (register, word) in REGISTERS.into_iter().zip(&mut self.words) {
+            let stands = word.caused | word.injected;
+            word.latched = if SHUTDOWNS.contains(&register) { stands } else { 0 };
         }
     }
 
