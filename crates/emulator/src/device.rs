@@ -308,7 +308,7 @@ impl Device {
     }
 }
 
-fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
+fn panel(profile: &'static Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
     match profile.key.as_str() {
         "datakom-d" => datakom_d(profile, config),
         "datakom-dkg705" => {
@@ -318,7 +318,7 @@ fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartErro
         }
         "smartgen-acc1700" => {
             let model = Model::of(chosen(&profile.models, config, "ACC1700CAN")?);
-            Ok(Box::new(Acc1700::new(model, config.seed, config.story)))
+            Ok(Box::new(Acc1700::new(profile, model, config.seed, config.story)))
         }
         "smartgen-hat821si" => {
             chosen(&profile.models, config, "HAT821SI")?;
