@@ -150,10 +150,15 @@ impl Player {
     }
 
     fn take(&mut self, step: Step, now: Duration, device: &mut Device) {
-        self.since = now;
+        let since = std::mem::replace(&mut self.since, now);
         self.report.taken += 1;
-        if let Trigger::When { text, .. } = &step.trigger {
-            self.tell(now, EventKind::Held, Some(step.place), text.clone());
+        match &step.trigger {
+            Trigger::When { condition, text, within: Some(within) } => {
+                let expected = format!("{text} within {}", in_words(*within));
+                self.check(step.place, expected, (since, now), true, (seen(condition, device), None));
+            }
+            Trigger::When { text, .. } => self.tell(now, EventKind::Held, Some(step.place), text.clone()),
+            Trigger::At(_) | Trigger::After(_) => {}
         }
         // What is expected at once is seen before anything is done.
         for expectation in step.expectations {
