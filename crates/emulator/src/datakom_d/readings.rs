@@ -1,9 +1,11 @@
 //! What the unit's terminals tell of the plant: the values that alarms are judged by, and what a broken sender hides.
 
-use crate::plant::Plant;
+use crate::plant::{self, HERTZ_PER_RPM, Plant};
 
 /// Above this a meter takes a source for one that is there, V.
 const ALIVE: f64 = 100.0;
+/// Part of the coolant at which its switch in the radiator falls.
+const COOLANT_SWITCH: f64 = 0.6;
 
 /// One look at the plant.
 #[derive(Clone, Debug, Default)]
@@ -19,7 +21,10 @@ pub(super) struct Readings {
     pub(super) canopy: f64,
     pub(super) ambient: f64,
 
-    /// 1/min by the magnetic pickup.
+    /// The coolant stands below its switch.
+    pub(super) coolant_low: bool,
+
+    /// 1/min by the magnetic pickup; a broken one looks like an engine that stands.
     pub(super) pickup: f64,
     /// 1/min by the pickup, else by the genset's frequency.
     pub(super) speed: f64,
@@ -59,15 +64,17 @@ impl Readings {
     pub(super) fn of(plant: &Plant, pumping: f64) -> Self {
         let (mains, genset) = (&plant.mains, &plant.genset);
         let current = genset.current();
+        let plant::Readings { oil_pressure, coolant, fuel_level, speed } = plant.readings();
         Self {
-            oil_pressure: Some(plant.engine.oil_pressure),
-            temperature: Some(plant.engine.coolant),
-            fuel_level: Some(plant.tank.percent()),
+            oil_pressure,
+            temperature: coolant,
+            fuel_level,
+            coolant_low: plant.engine.coolant_level < COOLANT_SWITCH,
             oil_temperature: plant.engine.oil,
             canopy: plant.canopy,
             ambient: plant.ambient,
-            pickup: plant.engine.speed,
-            speed: plant.engine.speed,
+            pickup: speed.unwrap_or(0.0),
+            speed: speed.unwrap_or(genset.frequency / HERTZ_PER_RPM),
             running: plant.engine.is_running(),
             turning: plant.engine.speed > 0.0,
             genset_voltage: (least(genset.voltage), greatest(genset.voltage)),
@@ -80,12 +87,12 @@ impl Readings {
             mains_active: mains.total_active(),
             mains_alive: mains.average_voltage() > ALIVE,
             mains_frequency: mains.frequency,
-            mains_in_order: true,
+            mains_in_order: !mains.phase_order_wrong,
             side_by_side: plant.mains_breaker.closed && plant.genset_breaker.closed,
             battery: [plant.batteries[0].voltage, plant.batteries[1].voltage],
             charge: plant.batteries[0].charge_input,
-            emergency_stop: false,
-            remote_start: false,
+            emergency_stop: plant.emergency_stop,
+            remote_start: plant.remote_start,
             pumping,
         }
     }

@@ -254,16 +254,20 @@ fn identity(unit: &DatakomD, bank: &mut Bank) {
     bank.bytes(11693, identity.imei.to_vec());
 }
 
-/// One genset alone on its busbar shares with nobody: the totals are its own.
+/// What all gensets on the bus bar carry together, and by how much this one is behind.
 fn load_share(unit: &DatakomD, bank: &mut Bank) {
-    let genset = &unit.plant.genset;
-    bank.number(11175, genset.total_active());
-    bank.number(11177, genset.total_reactive());
-    bank.number(11374, 100.0 * genset.total_active() / RATED_KW);
-    bank.number(11375, 100.0 * genset.total_reactive() / RATED_KVAR);
-    bank.number(11376, genset.total_power_factor());
-    bank.number(11377, 0.0);
-    bank.number(11378, 0.0);
+    let (genset, sisters) = (&unit.plant.genset, &unit.plant.sisters);
+    let (own_active, own_reactive) = (genset.total_active(), genset.total_reactive());
+    let (active, reactive) = (own_active + sisters.active(), own_reactive + sisters.reactive());
+    let apparent = active.hypot(reactive);
+    let sets = 1.0 + sisters.on_bus() as f64;
+    bank.number(11175, active);
+    bank.number(11177, reactive);
+    bank.number(11374, 100.0 * active / (sets * RATED_KW));
+    bank.number(11375, 100.0 * reactive / (sets * RATED_KVAR));
+    bank.number(11376, if apparent > 0.0 { active / apparent } else { 0.0 });
+    bank.number(11377, sisters.behind(own_active));
+    bank.number(11378, 100.0 * (reactive / sets - own_reactive) / RATED_KVAR);
 }
 
 /// Whose hours or days are used up, and those that somebody has injected.

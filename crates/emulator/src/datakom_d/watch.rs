@@ -128,6 +128,7 @@ const RULES: &[Rule] = &[
     rule(96, Warning, Always, Below("low_battery_warning", 0.5), Seconds(10.0), |r| Some(r.battery[0])),
     rule(97, Warning, Always, Above("high_battery_warning", 0.5), Seconds(10.0), |r| Some(r.battery[0])),
     rule(100, Warning, Running, Below("low_charge_warning", 2.0), Seconds(10.0), |r| Some(r.charge)),
+    rule(103, Shutdown, Running, True, Seconds(3.0), |r| flag(r.coolant_low)),
     rule(104, Warning, Protected, Above("voltage_unbalance_warning", 2.0), Seconds(5.0), |r| Some(r.voltage_unbalance)),
     rule(105, Warning, Protected, Above("current_unbalance_warning", 5.0), Seconds(10.0), |r| Some(r.current_unbalance)),
     rule(106, Warning, Protected, Above("over_current_warning", 4.0), Seconds(3.0), |r| Some(r.genset_current)),

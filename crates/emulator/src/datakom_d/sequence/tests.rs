@@ -335,6 +335,7 @@ mod chance {
             no_break_transfer: chance(0.6),
             soft_transfer: chance(0.5),
             slave: chance(0.3),
+            start_attempts: if chance(0.5) { 1 } else { 3 },
             synchronizing: Duration::from_secs(3),
             cooldown: Duration::from_secs(3),
             stop: Duration::from_secs(2),
@@ -362,7 +363,7 @@ mod chance {
             }
             if sequence.operation() == Cranking {
                 sensed.running |= chance(0.05);
-            } else if !sequence.may_turn() || chance(0.002) {
+            } else if !sequence.may_turn() || chance(0.004) {
                 sensed.running = false;
             }
             sensed.turning = sensed.running;
@@ -375,7 +376,7 @@ mod chance {
             let controls = sequence.controls(demand, sensed);
             closes_lawfully(now, sensed, &controls, &sequence);
             if chance(0.6) {
-                sensed.genset_breaker = controls.genset_breaker;
+                sensed.genset_breaker = controls.genset_breaker && !chance(0.02);
             }
             if chance(0.6) {
                 sensed.mains_breaker = controls.mains_breaker;
