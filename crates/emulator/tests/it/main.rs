@@ -12,6 +12,7 @@ mod lines;
 mod pins;
 mod prop;
 mod push_buttons;
+mod scenarios;
 mod server;
 mod site;
 mod wire_rules;
