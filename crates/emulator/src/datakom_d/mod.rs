@@ -18,6 +18,8 @@ mod service;
 mod settings;
 mod status;
 mod story;
+#[cfg(test)]
+mod transitions;
 mod watch;
 
 use std::time::Duration;
