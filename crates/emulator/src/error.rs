@@ -5,6 +5,7 @@ use std::io;
 use busbar_link::{Endpoint, SerialError};
 use busbar_profile::{Number, SerialSettings};
 
+use crate::server::SpeedError;
 use crate::settings::SettingError;
 
 /// An imitation was not started; nothing is left running.
@@ -44,11 +45,8 @@ pub enum StartError {
         max: u8,
     },
     /// The simulated clock cannot run that fast.
-    #[error("speed {speed} is not possible, choose a number above 0 and up to {}", crate::MAX_SPEED)]
-    Speed {
-        /// What was asked for, as text.
-        speed: String,
-    },
+    #[error(transparent)]
+    Speed(#[from] SpeedError),
     /// A value was pinned that its point cannot have.
     #[error(transparent)]
     Pin(#[from] PinError),

@@ -32,7 +32,7 @@ pub use device::{Device, STEP};
 pub use error::{PinError, PinProblem, StartError};
 pub use inject::{Alarm, InjectError};
 pub use levers::{Lever, LeverError, Numbers, Position, Word};
-pub use server::{Emulation, Statistics, start, start_together};
+pub use server::{Controller, Emulation, Pace, SpeedError, Statistics, start, start_together};
 pub use settings::SettingError;
 
 /// The fastest simulated clock: an hour a second.
