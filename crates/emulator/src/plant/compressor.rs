@@ -5,8 +5,10 @@
 use crate::random::{Drift, Random, approach};
 
 use super::air::Air;
+use super::engine::Inputs;
 use super::exhaust::{Exhaust, ParticleFilter};
-use super::{Battery, Controls, Engine, RATED_KW, RATED_RPM, Tank};
+use super::supplies::Service;
+use super::{Battery, Engine, RATED_KW, RATED_RPM, Tank};
 
 /// What a panel can do to the compressor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,10 +76,16 @@ impl Compressor {
     /// Lets `dt` seconds pass; meant for steps of about a tenth of a second.
     pub(crate) fn step(&mut self, dt: f64, orders: &Orders) {
         self.time += dt;
-        let fuel = orders.fuel && self.tank.litres > 0.0;
-        let controls = Controls { fuel, starter: orders.starter, idle: orders.idle, ..Controls::default() };
-        let power = self.shaft_power();
-        self.engine.step(dt, &controls, power, self.intake, &mut self.random);
+        let fuel = orders.fuel && self.tank.feeds();
+        let inputs = Inputs {
+            fuel,
+            starter: orders.starter.then(|| self.battery.strength()),
+            idle: orders.idle,
+            heater: false,
+            load: self.shaft_power(),
+            ambient: self.intake,
+        };
+        self.engine.step(dt, &inputs, &mut self.random);
         let speed = self.engine.speed / RATED_RPM;
         self.air.step(dt, speed, orders.load_valve, orders.blow_down, self.ambient, &mut self.random);
 
@@ -85,7 +93,8 @@ impl Compressor {
         self.exhaust.step(dt, running, pull, speed, self.filter.is_regenerating(), self.intake);
         self.filter.step(dt, running, &self.exhaust);
         // A small charger on shore supply keeps the battery while the engine rests.
-        self.battery.step(dt, orders.starter, running, true, &mut self.random);
+        let service = Service { cranking: orders.starter, running, supplied: true };
+        self.battery.step(dt, service, &mut self.random);
         self.tank.step(dt, self.engine.burn, self.refilling);
         self.climate(dt);
 

@@ -467,7 +467,7 @@ mod tests {
     fn the_residual_is_what_the_phases_leave_over() {
         let mut source = Plant::new(4, Positions::of(1, 0, 1)).sources[0].clone();
         let (active, reactive) = ([800.0; 3], [300.0; 3]);
-        source.feed = Feed { voltage: [5800.0; 3], frequency: 50.0, active, reactive };
+        source.feed = Feed { voltage: [5800.0; 3], frequency: 50.0, active, reactive, ..Feed::default() };
         assert!(source.residual().0 < 1e-6);
         source.feed.active[1] = 0.0;
         source.feed.reactive[1] = 0.0;
