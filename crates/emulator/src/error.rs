@@ -191,7 +191,7 @@ pub enum PinProblem {
     },
 }
 
-fn listen_reason(kind: io::ErrorKind) -> String {
+pub(crate) fn listen_reason(kind: io::ErrorKind) -> String {
     match kind {
         io::ErrorKind::AddrInUse => "the port is taken; stop the other program or choose another port".into(),
         io::ErrorKind::PermissionDenied => "this user may not use that port; choose one above 1023".into(),

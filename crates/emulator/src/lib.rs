@@ -9,6 +9,7 @@
 
 mod bank;
 mod config;
+pub mod control;
 mod datakom_d;
 mod datakom_dkg705;
 mod device;
