@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod acc1700;
+mod control;
 mod datakom_d;
 mod dkg705;
 mod golden;
@@ -9,6 +10,7 @@ mod hat821si;
 mod identities;
 #[cfg(target_os = "linux")]
 mod lines;
+mod openapi;
 mod pins;
 mod prop;
 mod push_buttons;
