@@ -117,6 +117,9 @@ pub(crate) struct Emulate {
     /// Hold a point at a value; may be repeated
     #[arg(long, value_name = "POINT=VALUE", value_parser = pin)]
     pub(crate) set: Vec<(String, String)>,
+    /// Play a scenario and end with it: 0 when all that it expects came, 1 when not, 2 when the file is wrong
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scenario: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]

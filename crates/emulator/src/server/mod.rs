@@ -22,6 +22,7 @@ use crate::MAX_SPEED;
 use crate::config::Config;
 use crate::device::{Device, STEP};
 use crate::error::StartError;
+use crate::scenario::Report;
 use bind::Socket;
 pub use door::Statistics;
 use door::{Door, Served};
@@ -96,7 +97,8 @@ async fn serve(
         urls.push(url);
         doors.push(door);
     }
-    Ok(Emulation { urls, doors, tasks })
+    let devices = served.into_iter().map(|(_, _, device)| device).collect();
+    Ok(Emulation { urls, doors, devices, tasks })
 }
 
 /// A running imitation; dropping it ends it.
@@ -104,6 +106,8 @@ async fn serve(
 pub struct Emulation {
     urls: Vec<Endpoint>,
     doors: Vec<Arc<Door>>,
+    /// In the order of their configurations.
+    devices: Vec<Arc<Served>>,
     tasks: JoinSet<()>,
 }
 
@@ -126,6 +130,12 @@ impl Emulation {
     /// What has happened on each of its endpoints so far, in the order of [`urls`](Self::urls).
     pub fn statistics_by_endpoint(&self) -> impl Iterator<Item = (&Endpoint, Statistics)> {
         self.doors.iter().map(|door| (&door.endpoint, *door.statistics()))
+    }
+
+    /// What has become so far of the scenario of the controller at that place among the configurations; none where it
+    /// has none.
+    pub fn report<T>(&self, index: usize, look: impl FnOnce(&Report) -> T) -> Option<T> {
+        self.devices.get(index)?.lock().report().map(look)
     }
 
     /// Drops every connection and frees the ports.

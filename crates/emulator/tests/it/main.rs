@@ -11,6 +11,7 @@ mod lines;
 mod pins;
 mod prop;
 mod push_buttons;
+mod scenarios;
 mod server;
 mod site;
 mod wire_rules;
