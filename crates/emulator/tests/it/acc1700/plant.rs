@@ -440,6 +440,24 @@ fn a_lever_of_every_kind_can_be_pulled_and_stands_where_it_is() {
     assert!(refused.starts_with("the plant has no `maintenance.11`; it has air.consumption, "), "{refused}");
 }
 
+#[test]
+fn the_story_goes_on_once_the_machine_is_seen_to() {
+    for (lever, to, healthy) in [("emergency_stop", "pressed", "released"), ("fuel.supply", "shut", "open")] {
+        let mut site = Site::new(&Config { story: true, ..config() });
+        site.pass_seconds(70);
+        assert_eq!(status(&site), 9);
+        pull(&mut site, lever, to);
+        site.pass_seconds(60);
+        assert!(common(&site, 1) && status(&site) == 0, "{lever}");
+        site.pass_seconds(300);
+        assert!(status(&site) != 9, "{lever}: nobody has seen to it");
+        pull(&mut site, lever, healthy);
+        site.pass_seconds(300 - 60);
+        // Its people press the stop key in the evening, which acknowledges, and start in the morning.
+        assert_eq!((status(&site), common(&site, 1)), (9, false), "{lever}");
+    }
+}
+
 /// One of the positions of a lever.
 fn position(lever: &Lever, choice: usize) -> String {
     let numbers = lever.numbers.map(|numbers| [numbers.min, (numbers.min + numbers.max) / 2.0, numbers.max]);
