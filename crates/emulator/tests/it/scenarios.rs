@@ -37,6 +37,8 @@ scenarios! {
     dkg705_short_dip: "dkg705-short-dip.toml",
     dkg705_soft_transfer: "dkg705-soft-transfer.toml",
     compressor_day: "compressor-day.toml",
+    compressor_hot_discharge: "compressor-hot-discharge.toml",
+    compressor_locked: "compressor-locked.toml",
 }
 
 #[test]
