@@ -40,6 +40,7 @@ pub struct Device {
     /// Alarms that were injected, by point and bit.
     injected: Vec<Alarm>,
     clock: Duration,
+    model: String,
     seed: u64,
     answer_delay: Duration,
     player: Option<Player>,
@@ -63,7 +64,7 @@ impl Device {
             let (title, controller) = (scenario.title().to_owned(), scenario.controller());
             return Err(StartError::OtherController { title, controller, key: profile.key.clone() });
         }
-        let mut panel = panel(profile, config)?;
+        let (mut panel, model) = panel(profile, config)?;
         let (mut bank, mut settings) = (Bank::new(profile), Settings::of(profile));
         for (name, text) in &config.pins {
             if profile.setting(name).is_some() {
@@ -85,9 +86,10 @@ impl Device {
             settings,
             injected: Vec::new(),
             clock: Duration::ZERO,
+            model: model.to_owned(),
             seed,
             answer_delay,
-            player: config.scenario.as_ref().map(|scenario| Player::new(scenario, config)),
+            player: config.scenario.as_ref().map(|scenario| Player::new(scenario, model, seed)),
         };
         device.stir();
         device.play();
@@ -153,6 +155,16 @@ impl Device {
     /// The unit id that it answers to.
     pub fn unit(&self) -> u8 {
         self.unit
+    }
+
+    /// Its model, as the profile writes it.
+    pub fn model(&self) -> &str {
+        &self.model
+    }
+
+    /// The seed of everything that is left to chance.
+    pub fn seed(&self) -> u64 {
+        self.seed
     }
 
     /// It answers no sooner than this after a request.
@@ -308,21 +320,22 @@ impl Device {
     }
 }
 
-fn panel(profile: &'static Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
+/// The panel of a profile, and the model that it is.
+fn panel(profile: &'static Profile, config: &Config) -> Result<(Box<dyn Panel>, &'static str), StartError> {
     match profile.key.as_str() {
         "datakom-d" => datakom_d(profile, config),
         "datakom-dkg705" => {
             // There is one.
-            chosen(&profile.models, config, "DKG-705")?;
-            Ok(Box::new(DatakomDkg705::new(config.seed, config.story).starting(config.epoch)))
+            let model = chosen(&profile.models, config, "DKG-705")?;
+            Ok((Box::new(DatakomDkg705::new(config.seed, config.story).starting(config.epoch)), model))
         }
         "smartgen-acc1700" => {
-            let model = Model::of(chosen(&profile.models, config, "ACC1700CAN")?);
-            Ok(Box::new(Acc1700::new(profile, model, config.seed, config.story)))
+            let model = chosen(&profile.models, config, "ACC1700CAN")?;
+            Ok((Box::new(Acc1700::new(profile, Model::of(model), config.seed, config.story)), model))
         }
         "smartgen-hat821si" => {
-            chosen(&profile.models, config, "HAT821SI")?;
-            Ok(Box::new(Hat821si::new(config.seed, config.story).starting(config.epoch)))
+            let model = chosen(&profile.models, config, "HAT821SI")?;
+            Ok((Box::new(Hat821si::new(config.seed, config.story).starting(config.epoch)), model))
         }
         _ => Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() }),
     }
@@ -337,7 +350,7 @@ fn chosen<'a>(models: &'a [String], config: &Config, default: &str) -> Result<&'
         .ok_or_else(|| StartError::UnknownModel { model: wanted.to_owned(), allowed: models.to_vec() })
 }
 
-fn datakom_d(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
+fn datakom_d<'a>(profile: &'a Profile, config: &Config) -> Result<(Box<dyn Panel>, &'a str), StartError> {
     let wanted = config.model.as_deref().unwrap_or("D-500");
     // Every unit that its identity tells apart, with those the manual's title does not name.
     let known = profile.identity.as_ref().map_or(&[][..], |identity| &identity.models);
@@ -345,5 +358,5 @@ fn datakom_d(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, Start
         let allowed = known.iter().map(|known| known.model.clone()).collect();
         return Err(StartError::UnknownModel { model: wanted.to_owned(), allowed });
     };
-    Ok(Box::new(DatakomD::new(&known.model, known.value, config.seed, config.story)))
+    Ok((Box::new(DatakomD::new(&known.model, known.value, config.seed, config.story)), &known.model))
 }

@@ -5,6 +5,7 @@ use std::io;
 use busbar_link::{Endpoint, SerialError};
 use busbar_profile::{Number, SerialSettings};
 
+use crate::server::SpeedError;
 use crate::settings::SettingError;
 
 /// An imitation was not started; nothing is left running.
@@ -44,11 +45,8 @@ pub enum StartError {
         max: u8,
     },
     /// The simulated clock cannot run that fast.
-    #[error("speed {speed} is not possible, choose a number above 0 and up to {}", crate::MAX_SPEED)]
-    Speed {
-        /// What was asked for, as text.
-        speed: String,
-    },
+    #[error(transparent)]
+    Speed(#[from] SpeedError),
     /// A value was pinned that its point cannot have.
     #[error(transparent)]
     Pin(#[from] PinError),
@@ -205,7 +203,7 @@ pub enum PinProblem {
     },
 }
 
-fn listen_reason(kind: io::ErrorKind) -> String {
+pub(crate) fn listen_reason(kind: io::ErrorKind) -> String {
     match kind {
         io::ErrorKind::AddrInUse => "the port is taken; stop the other program or choose another port".into(),
         io::ErrorKind::PermissionDenied => "this user may not use that port; choose one above 1023".into(),

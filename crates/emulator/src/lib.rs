@@ -10,6 +10,7 @@
 
 mod bank;
 mod config;
+pub mod control;
 mod datakom_d;
 mod datakom_dkg705;
 mod device;
@@ -37,7 +38,7 @@ pub use facts::{Fact, FactError, FactKind, Subject};
 pub use inject::{Alarm, InjectError};
 pub use levers::{Lever, LeverError, Numbers, Position, Word};
 pub use scenario::{Check, CheckVerdict, Event, EventKind, Report, Scenario, Seen};
-pub use server::{Emulation, Statistics, start, start_together};
+pub use server::{Controller, Emulation, Pace, SpeedError, Statistics, start, start_together};
 pub use settings::SettingError;
 
 /// The fastest simulated clock: an hour a second.

@@ -2,12 +2,14 @@
 #![cfg(test)]
 
 mod acc1700;
+mod control;
 mod dkg705;
 mod golden;
 mod hat821si;
 mod identities;
 #[cfg(target_os = "linux")]
 mod lines;
+mod openapi;
 mod pins;
 mod prop;
 mod push_buttons;
