@@ -350,7 +350,10 @@ fn chosen<'a>(models: &'a [String], config: &Config, default: &str) -> Result<&'
         .ok_or_else(|| StartError::UnknownModel { model: wanted.to_owned(), allowed: models.to_vec() })
 }
 
-fn datakom_d<'a>(profile: &'a Profile, config: &Config) -> Result<(Box<dyn Panel>, &'a str), StartError> {
+fn datakom_d(
+    profile: &'static Profile,
+    config: &Config,
+) -> Result<(Box<dyn Panel>, &'static str), StartError> {
     let wanted = config.model.as_deref().unwrap_or("D-500");
     // Every unit that its identity tells apart, with those the manual's title does not name.
     let known = profile.identity.as_ref().map_or(&[][..], |identity| &identity.models);
