@@ -6,12 +6,15 @@ use busbar_profile::DateTime;
 use jiff::Zoned;
 use serde::Serialize;
 
+use super::{control, run};
 use crate::{args, failure::Failure, logging, profiles, runtime, terminal, wall_clock};
 
 /// Where it answers, as `--json` prints it.
 #[derive(Serialize)]
 struct Bound<'a> {
     urls: &'a [Endpoint],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    control: Option<String>,
 }
 
 pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
@@ -30,15 +33,25 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
         pins: args.set,
         ..usual
     };
+    let token = control::token()?;
     runtime::service(async |mut stop| {
         let emulation = busbar_emulator::start(config).await.map_err(failure)?;
+        let control = match args.control {
+            Some(address) => Some(control::serve(address, &emulation, token).await?),
+            None => None,
+        };
+        let (urls, page) = (emulation.urls(), control.as_ref().map(|control| run::page(control.address())));
         if json {
-            terminal::print_json(&Bound { urls: emulation.urls() })?;
+            terminal::print_json(&Bound { urls, control: page })?;
         } else {
-            let lines: Vec<String> = emulation.urls().iter().map(|url| format!("{url}\n")).collect();
+            let mut lines: Vec<String> = urls.iter().map(|url| format!("{url}\n")).collect();
+            lines.extend(page.map(|page| format!("control {page}\n")));
             terminal::print(&lines.concat())?;
         }
         stop.wait().await;
+        if let Some(control) = control {
+            control.stop().await;
+        }
         emulation.stop().await;
         Ok(())
     })
