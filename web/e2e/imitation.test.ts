@@ -68,12 +68,12 @@ const SITE = [
   {
     id: 'genset-1',
     name: 'Genset 1',
-    drawn: /Mains .*Mains breaker, (open|closed).*Tank.*Radiator.*Battery/,
+    drawn: /Mains, .*Mains breaker, (open|closed).*Tank.*Radiator.*Battery/,
   },
   {
     id: 'genset-2',
     name: 'Genset 2',
-    drawn: /Mains .*Mains breaker, (open|closed).*Tank.*Radiator.*Battery/,
+    drawn: /Mains, .*Mains breaker, (open|closed).*Tank.*Radiator.*Battery/,
   },
   { id: 'switch-1', name: 'Transfer switch', drawn: /Source 1.*QS1, (open|closed).*Source 2.*QTIE/ },
   { id: 'compressor-1', name: 'Compressor', drawn: /Engine.*Load valve, (un)?loaded.*Receiver.*kPa.*Tank/ },

@@ -121,6 +121,9 @@ pub(crate) struct Emulate {
     /// machine BUSBAR_CONTROL_TOKEN must hold a token of 16 characters or more
     #[arg(long, value_name = "ADDR:PORT", value_parser = socket_address)]
     pub(crate) control: Option<SocketAddr>,
+    /// Play a scenario and end with it: 0 when all that it expects came, 1 when not, 2 when the file is wrong
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scenario: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]

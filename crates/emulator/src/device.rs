@@ -16,6 +16,7 @@ use crate::panel::Panel;
 use crate::pins;
 use crate::random::Random;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
+use crate::scenario::{Player, Report};
 use crate::settings::{SettingError, Settings};
 use crate::smartgen_acc1700::{Acc1700, Model};
 use crate::smartgen_hat821si::Hat821si;
@@ -42,6 +43,7 @@ pub struct Device {
     model: String,
     seed: u64,
     answer_delay: Duration,
+    player: Option<Player>,
 }
 
 impl Device {
@@ -55,6 +57,12 @@ impl Device {
         let range = &profile.wire.unit;
         if !(range.min..=range.max).contains(&config.unit) {
             return Err(StartError::Unit { unit: config.unit, min: range.min, max: range.max });
+        }
+        if let Some(scenario) =
+            config.scenario.as_ref().filter(|scenario| scenario.controller() != profile.key)
+        {
+            let (title, controller) = (scenario.title().to_owned(), scenario.controller());
+            return Err(StartError::OtherController { title, controller, key: profile.key.clone() });
         }
         let (mut panel, model) = panel(profile, config)?;
         let (mut bank, mut settings) = (Bank::new(profile), Settings::of(profile));
@@ -81,8 +89,10 @@ impl Device {
             model: model.to_owned(),
             seed,
             answer_delay,
+            player: config.scenario.as_ref().map(|scenario| Player::new(scenario, config)),
         };
         device.stir();
+        device.play();
         Ok(device)
     }
 
@@ -93,6 +103,10 @@ impl Device {
             self.panel.step(STEP);
             self.clock += STEP;
             moved = true;
+            if self.report().is_some_and(|report| !report.is_over()) {
+                self.panel.render(&mut self.bank);
+                self.play();
+            }
         }
         if moved {
             self.panel.render(&mut self.bank);
@@ -268,6 +282,11 @@ impl Device {
         Ok(())
     }
 
+    /// What has become of its scenario; none where it has none.
+    pub fn report(&self) -> Option<&Report> {
+        self.player.as_ref().map(Player::report)
+    }
+
     /// The profile that it follows.
     pub fn profile(&self) -> &'static Profile {
         self.bank.profile()
@@ -276,6 +295,14 @@ impl Device {
     /// How many values of the panel its profile could not hold since power-on; anything but 0 is our fault.
     pub fn misfits(&self) -> u64 {
         self.bank.refused()
+    }
+
+    /// Lets the scenario go on: what it reads is what a client would read now.
+    fn play(&mut self) {
+        if let Some(mut player) = self.player.take() {
+            player.go_on(self);
+            self.player = Some(player);
+        }
     }
 
     /// Noise that depends on the seed and the time alone, however time was let pass.
@@ -294,7 +321,7 @@ impl Device {
 }
 
 /// The panel of a profile, and the model that it is.
-fn panel<'a>(profile: &'a Profile, config: &Config) -> Result<(Box<dyn Panel>, &'a str), StartError> {
+fn panel(profile: &'static Profile, config: &Config) -> Result<(Box<dyn Panel>, &'static str), StartError> {
     match profile.key.as_str() {
         "datakom-d" => datakom_d(profile, config),
         "datakom-dkg705" => {
@@ -304,7 +331,7 @@ fn panel<'a>(profile: &'a Profile, config: &Config) -> Result<(Box<dyn Panel>, &
         }
         "smartgen-acc1700" => {
             let model = chosen(&profile.models, config, "ACC1700CAN")?;
-            Ok((Box::new(Acc1700::new(Model::of(model), config.seed, config.story)), model))
+            Ok((Box::new(Acc1700::new(profile, Model::of(model), config.seed, config.story)), model))
         }
         "smartgen-hat821si" => {
             let model = chosen(&profile.models, config, "HAT821SI")?;

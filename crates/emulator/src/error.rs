@@ -53,6 +53,18 @@ pub enum StartError {
     /// The controller was to be set to something that it cannot be set to.
     #[error(transparent)]
     Setting(#[from] SettingError),
+    /// The scenario happens to another controller.
+    #[error(
+        "the scenario \"{title}\" is for {controller}, not for {key}; imitate {controller}, or choose another one"
+    )]
+    OtherController {
+        /// What the scenario is called.
+        title: String,
+        /// The profile that it is for.
+        controller: &'static str,
+        /// What was to be imitated.
+        key: String,
+    },
     /// Nothing was given to imitate.
     #[error("there is no controller to imitate; name at least one")]
     NoController,

@@ -42,6 +42,30 @@ impl Canvas {
         self.text(line, COLUMNS - length, text);
     }
 
+    /// Lights a pixel; what lies outside is cut.
+    pub(crate) fn dot(&mut self, x: usize, y: usize) {
+        if let Some(row) = self.rows.get_mut(y).filter(|_| x < WIDTH) {
+            *row |= 1 << x;
+        }
+    }
+
+    /// Fills a rectangle.
+    pub(crate) fn fill(&mut self, x: usize, y: usize, width: usize, height: usize) {
+        for y in y..y + height {
+            for x in x..x + width {
+                self.dot(x, y);
+            }
+        }
+    }
+
+    /// Draws the edge of a rectangle.
+    pub(crate) fn frame(&mut self, x: usize, y: usize, width: usize, height: usize) {
+        self.fill(x, y, width, 1);
+        self.fill(x, y + height.saturating_sub(1), width, 1);
+        self.fill(x, y, 1, height);
+        self.fill(x + width.saturating_sub(1), y, 1, height);
+    }
+
     /// Turns light and dark round in one line of text.
     pub(crate) fn invert(&mut self, line: usize) {
         for row in self.rows.iter_mut().skip(line * 8).take(8) {
@@ -114,6 +138,9 @@ fn glyph(letter: char) -> [u8; 7] {
         '-' => [0, 0, 0, 0b11111, 0, 0, 0],
         '/' => [0b00001, 0b00001, 0b00010, 0b00100, 0b01000, 0b10000, 0b10000],
         '%' => [0b11001, 0b11001, 0b00010, 0b00100, 0b01000, 0b10011, 0b10011],
+        '+' => [0, 0b00100, 0b00100, 0b11111, 0b00100, 0b00100, 0],
+        '=' => [0, 0, 0b11111, 0, 0b11111, 0, 0],
+        '>' => [0b01000, 0b00100, 0b00010, 0b00001, 0b00010, 0b00100, 0b01000],
         '!' => [0b00100, 0b00100, 0b00100, 0b00100, 0b00100, 0, 0b00100],
         '(' => [0b00010, 0b00100, 0b01000, 0b01000, 0b01000, 0b00100, 0b00010],
         ')' => [0b01000, 0b00100, 0b00010, 0b00010, 0b00010, 0b00100, 0b01000],
@@ -148,6 +175,17 @@ mod tests {
                 "............",
             ]
         );
+    }
+
+    #[test]
+    fn a_frame_is_hollow_and_nothing_is_drawn_outside() {
+        let mut canvas = Canvas::new();
+        canvas.frame(1, 1, 4, 3);
+        canvas.fill(127, 63, 5, 5);
+        canvas.dot(128, 0);
+        canvas.dot(0, 64);
+        assert_eq!(drawn(&canvas, 6, 5), ["......", ".####.", ".#..#.", ".####.", "......"]);
+        assert!(canvas.is_set(127, 63) && !canvas.is_set(126, 63));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! - the plant (mains, genset, load, tank) is stepped by a simulated clock and a seed;
 //! - a panel reads it, drives it, and stores every documented register through the profile;
 //! - levers and injected alarms make things happen, as the grid, wear or a person would;
+//! - a [`Scenario`] tells what happens, one thing after the other, and what is expected;
 //! - [`Device`] puts the wire rules in front: requests in, responses out, no I/O;
 //! - [`start`] gives a device sockets, serial lines and a clock; [`start_together`] puts several on one wire.
 
@@ -23,6 +24,7 @@ mod pins;
 mod plant;
 mod random;
 mod rules;
+mod scenario;
 mod server;
 mod settings;
 mod smartgen_acc1700;
@@ -35,6 +37,7 @@ pub use error::{PinError, PinProblem, StartError};
 pub use facts::{Fact, FactError, FactKind, Subject};
 pub use inject::{Alarm, InjectError};
 pub use levers::{Lever, LeverError, Numbers, Position, Word};
+pub use scenario::{Check, CheckVerdict, Event, EventKind, Report, Scenario, Seen};
 pub use server::{Controller, Emulation, Pace, SpeedError, Statistics, start, start_together};
 pub use settings::SettingError;
 

@@ -15,6 +15,7 @@ mod profile;
 mod pty;
 #[cfg(target_os = "linux")]
 mod run;
+mod scenario;
 #[cfg(target_os = "linux")]
 mod serial;
 mod services;

@@ -36,8 +36,10 @@ const CIRCULATES: f64 = 0.5;
 /// What works on an engine from outside.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Inputs {
-    /// Fuel arrives at the injection pump.
+    /// The fuel solenoid has its current.
     pub(super) fuel: bool,
+    /// There is fuel at the solenoid.
+    pub(super) fed: bool,
     /// The starter is engaged: part of its usual speed that the battery gives it.
     pub(super) starter: Option<f64>,
     /// Governor at idle speed.
@@ -62,7 +64,9 @@ pub(super) enum Ignition {
 /// What is worn or broken.
 #[derive(Clone, Debug)]
 pub(super) struct Wear {
-    pub(super) ignition: Ignition,
+    ignition: Ignition,
+    /// The fuel solenoid does not close.
+    pub(super) solenoid_stuck: bool,
     pub(super) oil_leaks: bool,
     pub(super) coolant_leaks: bool,
     pub(super) radiator_blocked: bool,
@@ -118,6 +122,7 @@ impl Engine {
             governor: Governor::default(),
             wear: Wear {
                 ignition: Ignition::Normal,
+                solenoid_stuck: false,
                 oil_leaks: false,
                 coolant_leaks: false,
                 radiator_blocked: false,
@@ -131,6 +136,10 @@ impl Engine {
 
     pub(crate) fn is_running(&self) -> bool {
         self.firing && self.speed > FIRED_RPM
+    }
+
+    pub(super) fn ignition(&self) -> Ignition {
+        self.wear.ignition
     }
 
     /// Somebody has seen to the ignition: attempts count from now on.
@@ -180,11 +189,14 @@ impl Engine {
         }
         self.starter_was_engaged = engaged;
 
-        self.firing &= inputs.fuel;
+        // One that is stuck was opened once.
+        let opened = inputs.fuel || self.wear.solenoid_stuck && self.firing;
+        let fuel = opened && inputs.fed;
+        self.firing &= fuel;
         match (self.firing, inputs.starter) {
             (true, _) => self.run(dt, inputs, random),
-            (false, Some(strength)) => self.crank(dt, inputs.fuel, strength),
-            (false, None) => self.coast(dt, inputs.fuel),
+            (false, Some(strength)) => self.crank(dt, fuel, strength),
+            (false, None) => self.coast(dt, fuel),
         }
     }
 
@@ -285,8 +297,15 @@ mod tests {
     use crate::plant::governor::Fault;
 
     const DT: f64 = 0.1;
-    const REST: Inputs =
-        Inputs { fuel: false, starter: None, idle: false, heater: false, load: 0.0, ambient: 20.0 };
+    const REST: Inputs = Inputs {
+        fuel: false,
+        fed: true,
+        starter: None,
+        idle: false,
+        heater: false,
+        load: 0.0,
+        ambient: 20.0,
+    };
     const FUEL: Inputs = Inputs { fuel: true, ..REST };
     const CRANK: Inputs = Inputs { starter: Some(1.0), ..FUEL };
 

@@ -6,9 +6,12 @@
 mod air;
 mod alternator;
 mod breaker;
+mod climate;
 mod compressor;
+mod compressor_levers;
 mod electrical;
 mod engine;
+mod engine_levers;
 mod exhaust;
 mod governor;
 mod grid;
@@ -23,6 +26,7 @@ mod tests;
 
 pub(crate) use breaker::Breaker;
 pub(crate) use compressor::{Compressor, Orders};
+pub(crate) use compressor_levers::COMPRESSOR_LEVERS;
 pub(crate) use electrical::{Energy, Feed};
 pub(crate) use engine::Engine;
 pub(crate) use governor::Regulation;
@@ -32,9 +36,10 @@ pub(crate) use senders::Readings;
 pub(crate) use sisters::Sisters;
 pub(crate) use supplies::{Battery, Tank};
 
-use crate::random::{Drift, Random, approach};
+use crate::random::{Random, approach};
 
 use alternator::Alternator;
+use climate::Climate;
 use engine::Inputs;
 use governor::Fault;
 use grid::{DEAD_PHASE, Grid};
@@ -103,8 +108,6 @@ pub(crate) struct Plant {
     /// The site's contact for a remote start is closed.
     pub(crate) remote_start: bool,
     senders: Senders,
-    /// The fuel solenoid does not close.
-    solenoid_stuck: bool,
     coupling: Coupling,
     grid: Grid,
     load: Load,
@@ -134,7 +137,6 @@ impl Plant {
             emergency_stop: false,
             remote_start: false,
             senders: Senders::default(),
-            solenoid_stuck: false,
             coupling: Coupling::default(),
             grid: Grid::new(&mut random),
             load: Load::new(&mut random),
@@ -158,9 +160,9 @@ impl Plant {
         self.genset_breaker.step(dt, controls.genset_breaker);
 
         let starter = controls.starter && !self.emergency_stop;
-        let opened = controls.fuel && !self.emergency_stop || self.solenoid_stuck && self.engine.firing;
         let inputs = Inputs {
-            fuel: opened && self.tank.feeds(),
+            fuel: controls.fuel && !self.emergency_stop,
+            fed: self.tank.feeds(),
             starter: starter.then(|| self.batteries[0].strength()),
             idle: controls.idle,
             heater: controls.block_heater,
@@ -312,34 +314,6 @@ impl Plant {
             (_, true) => (NO_LOAD, shared),
             _ => (NO_LOAD, NO_LOAD),
         }
-    }
-}
-
-/// The weather at the site.
-#[derive(Clone, Debug)]
-struct Climate {
-    /// degC at which it is held; none where it follows the day.
-    held: Option<f64>,
-    outside: f64,
-    weather: Drift,
-}
-
-impl Climate {
-    fn new(random: &mut Random) -> Self {
-        Self { held: None, outside: 20.0, weather: Drift::new(0.4, 600.0, random) }
-    }
-
-    /// Power-on is ten in the morning.
-    fn hour(time: f64) -> f64 {
-        10.0 + time / 3600.0
-    }
-
-    /// degC outside.
-    fn step(&mut self, dt: f64, time: f64, random: &mut Random) -> f64 {
-        // The warmest hour is three in the afternoon.
-        let day = 4.0 * ((Self::hour(time) - 9.0) / 24.0 * std::f64::consts::TAU).sin();
-        approach(&mut self.outside, self.held.unwrap_or(19.0 + day), 120.0, dt);
-        self.outside + self.weather.step(dt, random)
     }
 }
 

@@ -1,6 +1,8 @@
 //! The imitated ACC1700: worked frames, wire rules, keys and the two procedures of its manual.
 
+mod alarms;
 mod life;
+mod settings;
 
 use std::time::Duration;
 

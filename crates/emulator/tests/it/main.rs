@@ -13,6 +13,7 @@ mod openapi;
 mod pins;
 mod prop;
 mod push_buttons;
+mod scenarios;
 mod server;
 mod site;
 mod wire_rules;

@@ -17,6 +17,17 @@ pub(super) fn positions(lever: &Lever) -> Vec<Position> {
     words.chain(ends.into_iter().flatten()).collect()
 }
 
+/// Ids are distinct and words are written as all are.
+pub(super) fn are_lawful(levers: &[Lever]) {
+    for (number, lever) in levers.iter().enumerate() {
+        assert!(levers[..number].iter().all(|other| other.id != lever.id), "{}", lever.id);
+        for word in lever.words {
+            let lawful = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+            assert!(word.id.chars().all(lawful), "{} {}", lever.id, word.id);
+        }
+    }
+}
+
 fn run(plant: &mut Plant, controls: &Controls, seconds: f64) {
     for _ in 0..(seconds / DT).round() as u32 {
         plant.step(DT, controls);

@@ -1,4 +1,6 @@
-//! `busbar emulate`: one imitated controller on one or more ports and lines.
+//! `busbar emulate`: one imitated controller on one or more ports and lines, and the scenario that happens to it.
+
+mod scenario;
 
 use busbar_emulator::{Config, StartError};
 use busbar_link::Endpoint;
@@ -20,17 +22,19 @@ struct Bound<'a> {
 pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
     logging::start("warn", logging::Format::Text)?;
     let profile = profiles::resolve(&args.key)?;
-    let usual = Config::default();
+    let scenario = args.scenario.as_deref().map(scenario::load).transpose()?;
+    let is_played = scenario.is_some();
+    let usual = scenario.map_or_else(Config::default, |scenario| scenario.config());
     let config = Config {
         unit: args.unit.or(profile.wire.unit.default).unwrap_or(1),
         profile: args.key,
-        model: args.model,
+        model: args.model.or(usual.model),
         listen: args.listen.into_iter().chain(args.more).collect(),
         seed: args.seed.unwrap_or(usual.seed),
-        // Who names a seed wants the same registers every time, the calendar's too.
-        epoch: if args.seed.is_some() { usual.epoch } else { today() },
+        // Who names a seed, or plays a scenario, wants the same registers every time, the calendar's too.
+        epoch: if args.seed.is_some() || is_played { usual.epoch } else { today() },
         speed: args.speed,
-        pins: args.set,
+        pins: usual.pins.into_iter().chain(args.set).collect(),
         ..usual
     };
     let token = control::token()?;
@@ -41,19 +45,27 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
             None => None,
         };
         let (urls, page) = (emulation.urls(), control.as_ref().map(|control| run::page(control.address())));
-        if json {
-            terminal::print_json(&Bound { urls, control: page })?;
-        } else {
+        if !json {
             let mut lines: Vec<String> = urls.iter().map(|url| format!("{url}\n")).collect();
             lines.extend(page.map(|page| format!("control {page}\n")));
             terminal::print(&lines.concat())?;
+        } else if !is_played {
+            terminal::print_json(&Bound { urls, control: page })?;
+        } else if let Some(page) = page {
+            // Standard output is for the one document about the scenario.
+            terminal::message(&format!("control {page}"));
         }
-        stop.wait().await;
+        let done = if is_played {
+            scenario::play(&emulation, &mut stop, json).await
+        } else {
+            stop.wait().await;
+            Ok(())
+        };
         if let Some(control) = control {
             control.stop().await;
         }
         emulation.stop().await;
-        Ok(())
+        done
     })
 }
 
