@@ -54,7 +54,8 @@ pub(super) fn lever(unit: &Acc1700, id: &str) -> Option<Position> {
         _ => match numbered(id) {
             Some(service) => {
                 let left = unit.services.left(unit.running_seconds());
-                left.get(service).map(|seconds| Position::Number(*seconds as f64 / 3600.0))
+                // To the hundredth of an hour, as people would write it.
+                left.get(service).map(|seconds| Position::Number((*seconds as f64 / 36.0).round() / 100.0))
             }
             None => unit.plant.lever(id),
         },
