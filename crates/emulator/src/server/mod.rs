@@ -23,7 +23,6 @@ use tokio::time::{Instant, MissedTickBehavior, interval};
 use crate::config::Config;
 use crate::device::{Device, STEP};
 use crate::error::StartError;
-use crate::scenario::Report;
 use bind::Socket;
 use clock::Clock;
 pub use clock::{Pace, SpeedError};
@@ -146,12 +145,6 @@ impl Emulation {
     /// What has happened on each of its endpoints so far, in the order of [`urls`](Self::urls).
     pub fn statistics_by_endpoint(&self) -> impl Iterator<Item = (&Endpoint, Statistics)> {
         self.doors.iter().map(|door| (&door.endpoint, *door.statistics()))
-    }
-
-    /// What has become so far of the scenario of the controller at that place among the configurations; none where it
-    /// has none.
-    pub fn report<T>(&self, index: usize, look: impl FnOnce(&Report) -> T) -> Option<T> {
-        self.controllers.get(index)?.with(|device| device.report().map(look))
     }
 
     /// Drops every connection and frees the ports.

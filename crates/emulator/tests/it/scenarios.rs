@@ -21,11 +21,27 @@ macro_rules! scenarios {
 }
 
 scenarios! {
-    datakom_d_weekly_test: "weekly-test.toml",
+    mains_failure_and_return: "mains-failure.toml",
+    short_dip_that_must_not_start: "short-dip.toml",
+    start_on_the_third_attempt: "third-attempt.toml",
+    fail_to_start: "fail-to-start.toml",
+    low_oil_pressure_shutdown: "low-oil-pressure.toml",
+    overheating: "overheating.toml",
+    overload_load_dump: "overload.toml",
+    breaker_that_will_not_close: "breaker-will-not-close.toml",
+    fuel_running_out: "fuel-running-out.toml",
+    battery_dying: "battery-dying.toml",
+    weekly_test_under_load: "weekly-test.toml",
+    emergency_stop: "emergency-stop.toml",
+    remote_start: "remote-start.toml",
+    synchronised_soft_transfer: "soft-transfer.toml",
+    peak_lopping: "peak-lopping.toml",
     dkg705_mains_failure: "dkg705-mains-failure.toml",
     dkg705_short_dip: "dkg705-short-dip.toml",
     dkg705_soft_transfer: "dkg705-soft-transfer.toml",
-    acc1700_day: "compressor-day.toml",
+    compressor_day: "compressor-day.toml",
+    compressor_hot_discharge: "compressor-hot-discharge.toml",
+    compressor_locked: "compressor-locked.toml",
 }
 
 #[test]
