@@ -52,6 +52,17 @@ fn every_file_is_played() {
 }
 
 #[test]
+fn the_documentation_lists_every_file() {
+    let page = fs::read_to_string(root().join("docs/scenarios.md")).unwrap();
+    for name in PLAYED {
+        let text = fs::read_to_string(folder().join(name)).unwrap();
+        let scenario = Scenario::parse(name, &text).unwrap();
+        let row = format!("| `{name}` | `{}` | {} |", scenario.controller(), scenario.title());
+        assert!(page.contains(&row), "docs/scenarios.md lacks this row:\n{row}");
+    }
+}
+
+#[test]
 fn the_example_of_the_documentation_holds() {
     let page = fs::read_to_string(root().join("docs/scenarios.md")).unwrap();
     let (_, rest) = page.split_once("```toml\n").unwrap();
