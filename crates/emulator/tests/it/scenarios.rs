@@ -39,6 +39,7 @@ scenarios! {
     dkg705_mains_failure: "dkg705-mains-failure.toml",
     dkg705_short_dip: "dkg705-short-dip.toml",
     dkg705_soft_transfer: "dkg705-soft-transfer.toml",
+    hat821si_remote_transfer: "hat821si-remote-transfer.toml",
     compressor_day: "compressor-day.toml",
     compressor_hot_discharge: "compressor-hot-discharge.toml",
     compressor_locked: "compressor-locked.toml",
