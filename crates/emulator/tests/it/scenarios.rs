@@ -39,6 +39,7 @@ scenarios! {
     dkg705_mains_failure: "dkg705-mains-failure.toml",
     dkg705_short_dip: "dkg705-short-dip.toml",
     dkg705_soft_transfer: "dkg705-soft-transfer.toml",
+    hat821si_remote_transfer: "hat821si-remote-transfer.toml",
     compressor_day: "compressor-day.toml",
     compressor_hot_discharge: "compressor-hot-discharge.toml",
     compressor_locked: "compressor-locked.toml",
@@ -49,6 +50,17 @@ fn every_file_is_played() {
     let files = fs::read_dir(folder()).unwrap();
     let names: BTreeSet<_> = files.map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
     assert_eq!(names, PLAYED.iter().map(|name| (*name).to_owned()).collect());
+}
+
+#[test]
+fn the_documentation_lists_every_file() {
+    let page = fs::read_to_string(root().join("docs/scenarios.md")).unwrap();
+    for name in PLAYED {
+        let text = fs::read_to_string(folder().join(name)).unwrap();
+        let scenario = Scenario::parse(name, &text).unwrap();
+        let row = format!("| `{name}` | `{}` | {} |", scenario.controller(), scenario.title());
+        assert!(page.contains(&row), "docs/scenarios.md lacks this row:\n{row}");
+    }
 }
 
 #[test]
