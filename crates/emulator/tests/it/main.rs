@@ -3,6 +3,7 @@
 
 mod acc1700;
 mod control;
+mod datakom_d;
 mod dkg705;
 mod golden;
 mod hat821si;
