@@ -67,6 +67,8 @@ function failed(error) {
     $('token').hidden = false
     $('site').hidden = true
   }
+  // What was not heard lately looks it.
+  $('site').classList.toggle('lost', !isRefused)
   tell(isRefused ? error.message : 'No connection to the imitation. What is shown is as it was last heard.')
 }
 
@@ -117,7 +119,7 @@ function showPlant(values) {
   $('state').textContent = `State: ${spaced(state ?? 'not known')} · Mode: ${spaced(mode ?? 'not known')}`
   $('drawing').replaceChildren(draw(shown, values))
   const pulled = shown.levers.filter((lever) => !isHealthy(lever) && typeof lever.position === 'string')
-  const list = pulled.map((lever) => `${lever.name}: ${spaced(lever.position)}`)
+  const list = pulled.map((lever) => `${lever.name} (${spaced(lever.position)})`)
   $('pulled').textContent = list.length > 0 ? `Pulled: ${list.join(' · ')}` : 'Nothing is pulled.'
 }
 
@@ -313,7 +315,7 @@ async function live() {
     if (!document.hidden) {
       try {
         await refresh()
-        if ($('problem').textContent.startsWith('No connection')) tell('')
+        if ($('site').classList.replace('lost', 'heard')) tell('')
       } catch (error) {
         failed(error)
       }
