@@ -2,6 +2,7 @@
 
 mod faults;
 mod life;
+mod page;
 mod parallel;
 mod properties;
 
