@@ -88,7 +88,9 @@ async function act(said, path, method, body) {
 const pull = (lever, position) =>
   act(`${lever.name}: ${worded(lever, position)}`, `/levers/${lever.id}`, 'PUT', { position })
 const worded = (lever, position) =>
-  typeof position === 'number' ? `${round(position)} ${lever.numbers?.unit ?? ''}`.trim() : spaced(position)
+  typeof position === 'number' ? `${round(position)} ${unitOf(lever.numbers)}`.trim() : spaced(position)
+/** A unit as people write it. */
+const unitOf = (numbers) => ({ degC: '°C', deg: '°' })[numbers?.unit] ?? numbers?.unit ?? ''
 const spaced = (word) => word.replaceAll('_', ' ')
 const round = (number) => Math.round(number * 100) / 100
 const isHealthy = (lever) => lever.words.length === 0 || lever.position === lever.words[0].id
@@ -195,7 +197,7 @@ function leverForm(lever) {
         button.dataset.word = id
         return button
       }),
-      ...(numbers ? [numberForm(numbers, `${lever.name}, ${numbers.unit}`, (to) => pull(lever, to))] : []),
+      ...(numbers ? [numberForm(numbers, lever.name, (to) => pull(lever, to))] : []),
     ),
     h('p'),
   )
@@ -203,14 +205,20 @@ function leverForm(lever) {
   return form
 }
 
-function numberForm({ min, max, unit }, name, set) {
+function numberForm(numbers, name, set) {
+  const { min, max } = numbers
   const input = h('input', { type: 'number', min, max, step: 'any', required: true, aria: { label: name } })
   input.placeholder = `${min} to ${max}`
   const onsubmit = (event) => {
     event.preventDefault()
     void set(Number(input.value))
   }
-  return h('form', { className: 'row', onsubmit }, h('label', {}, input, unit ?? ''), h('button', {}, 'Set'))
+  return h(
+    'form',
+    { className: 'row', onsubmit },
+    h('label', {}, input, unitOf(numbers)),
+    h('button', {}, 'Set'),
+  )
 }
 
 function showAlarms() {
@@ -275,7 +283,7 @@ async function showSettings(id) {
       h(
         'fieldset',
         {},
-        h('legend', {}, `${setting.name} `, h('small', {}, `${round(setting.value)} ${setting.unit ?? ''}`)),
+        h('legend', {}, `${setting.name} `, h('small', {}, `${round(setting.value)} ${unitOf(setting)}`)),
         numberForm(setting, setting.name, set(setting)),
       ),
     ),
