@@ -20,6 +20,8 @@ const SWITCHES = [
 const $ = (id) => document.getElementById(id)
 /** Belongs to the controller that is shown now; another one begins anew. */
 let shown
+/** The point that says what it is doing, in more words than the vocabulary has. */
+let statePoint
 let controllers = []
 let asking
 
@@ -65,6 +67,8 @@ function failed(error) {
     $('token').hidden = false
     $('site').hidden = true
   }
+  // What was not heard lately looks it.
+  $('site').classList.toggle('lost', !isRefused)
   tell(isRefused ? error.message : 'No connection to the imitation. What is shown is as it was last heard.')
 }
 
@@ -84,7 +88,9 @@ async function act(said, path, method, body) {
 const pull = (lever, position) =>
   act(`${lever.name}: ${worded(lever, position)}`, `/levers/${lever.id}`, 'PUT', { position })
 const worded = (lever, position) =>
-  typeof position === 'number' ? `${round(position)} ${lever.numbers?.unit ?? ''}`.trim() : spaced(position)
+  typeof position === 'number' ? `${round(position)} ${unitOf(lever.numbers)}`.trim() : spaced(position)
+/** A unit as people write it. */
+const unitOf = (numbers) => ({ degC: '°C', deg: '°' })[numbers?.unit] ?? numbers?.unit ?? ''
 const spaced = (word) => word.replaceAll('_', ' ')
 const round = (number) => Math.round(number * 100) / 100
 const isHealthy = (lever) => lever.words.length === 0 || lever.position === lever.words[0].id
@@ -107,15 +113,15 @@ function showControllers() {
 }
 
 function showPlant(values) {
-  const { vendor, model, unit, endpoints, seed, kind } = shown
+  const { vendor, model, unit, endpoints, seed } = shown
   $('name').textContent = shown.name
   $('about').textContent = `${vendor} ${model}, unit ${unit} at ${endpoints.join(', ')}, seed ${seed}`
-  const state = values.get(kind === 'transfer_switch' ? 'state.transfer' : 'state.engine')?.value
+  const state = values.get(statePoint)?.value
   const mode = values.get('mode')?.value
   $('state').textContent = `State: ${spaced(state ?? 'not known')} · Mode: ${spaced(mode ?? 'not known')}`
   $('drawing').replaceChildren(draw(shown, values))
   const pulled = shown.levers.filter((lever) => !isHealthy(lever) && typeof lever.position === 'string')
-  const list = pulled.map((lever) => `${lever.name}: ${spaced(lever.position)}`)
+  const list = pulled.map((lever) => `${lever.name} (${spaced(lever.position)})`)
   $('pulled').textContent = list.length > 0 ? `Pulled: ${list.join(' · ')}` : 'Nothing is pulled.'
 }
 
@@ -144,10 +150,16 @@ function showClock() {
 }
 
 const change = (clock) =>
-  act('paused' in clock ? (clock.paused ? 'Paused' : 'Goes on') : `Speed ${clock.speed}`, '/clock', 'PUT', clock)
+  act(
+    'paused' in clock ? (clock.paused ? 'Paused' : 'Goes on') : `Speed ${clock.speed}`,
+    '/clock',
+    'PUT',
+    clock,
+  )
 
 function showSwitches() {
   const known = SWITCHES.filter(([id]) => leverOf(id))
+  $('switches').parentElement.hidden = known.length === 0
   fill($('switches'), [shown.id, known.map(([id]) => isHealthy(leverOf(id)))], () =>
     known.map(([id, to, name, undo]) => {
       const lever = leverOf(id)
@@ -160,6 +172,7 @@ function showSwitches() {
 
 function showLevers() {
   fill($('levers'), [shown.id], () => shown.levers.map(leverForm))
+  $('levers').parentElement.hidden = shown.levers.length === 0
   for (const lever of shown.levers) {
     const form = document.querySelector(`#levers [data-lever="${lever.id}"]`)
     form.querySelector('small').textContent = worded(lever, lever.position)
@@ -184,7 +197,7 @@ function leverForm(lever) {
         button.dataset.word = id
         return button
       }),
-      ...(numbers ? [numberForm(numbers, `${lever.name}, ${numbers.unit}`, (to) => pull(lever, to))] : []),
+      ...(numbers ? [numberForm(numbers, lever.name, (to) => pull(lever, to))] : []),
     ),
     h('p'),
   )
@@ -192,14 +205,20 @@ function leverForm(lever) {
   return form
 }
 
-function numberForm({ min, max, unit }, name, set) {
+function numberForm(numbers, name, set) {
+  const { min, max } = numbers
   const input = h('input', { type: 'number', min, max, step: 'any', required: true, aria: { label: name } })
   input.placeholder = `${min} to ${max}`
   const onsubmit = (event) => {
     event.preventDefault()
     void set(Number(input.value))
   }
-  return h('form', { className: 'row', onsubmit }, h('label', {}, input, unit ?? ''), h('button', {}, 'Set'))
+  return h(
+    'form',
+    { className: 'row', onsubmit },
+    h('label', {}, input, unitOf(numbers)),
+    h('button', {}, 'Set'),
+  )
 }
 
 function showAlarms() {
@@ -211,7 +230,10 @@ function showAlarms() {
         h('span', {}, `${label} (${spaced(kind)})`),
         h(
           'button',
-          { onclick: () => act(`${label}: let go`, `/alarms/${id}`, 'DELETE'), aria: { label: `Let ${label} go` } },
+          {
+            onclick: () => act(`${label}: let go`, `/alarms/${id}`, 'DELETE'),
+            aria: { label: `Let ${label} go` },
+          },
           'Let go',
         ),
       ),
@@ -228,7 +250,10 @@ function showPins(pins) {
         h('span', {}, `${point} = ${value}`),
         h(
           'button',
-          { onclick: () => act(`${point}: let go`, `/pins/${point}`, 'DELETE'), aria: { label: `Let ${point} go` } },
+          {
+            onclick: () => act(`${point}: let go`, `/pins/${point}`, 'DELETE'),
+            aria: { label: `Let ${point} go` },
+          },
           'Let go',
         ),
       ),
@@ -239,6 +264,7 @@ function showPins(pins) {
 /** What does not change by itself: asked for once, when another controller is shown. */
 async function begin(id) {
   const [alarms, points] = await Promise.all([ask(`/${id}/alarms`), ask(`/${id}/points`)])
+  statePoint = points.find(({ signal }) => signal === 'state.transfer' || signal === 'state.engine')?.id
   $('alarms').replaceChildren(...alarms.map(({ id, label }) => h('option', { value: id, label })))
   $('points').replaceChildren(...points.map(({ id, name }) => h('option', { value: id, label: name })))
   for (const form of [$('inject'), $('pin')]) form.reset()
@@ -248,7 +274,8 @@ async function begin(id) {
 async function showSettings(id) {
   const settings = await ask(`/${id}/settings`)
   const set = (setting) => async (value) => {
-    if (await act(`${setting.name}: ${value}`, `/settings/${setting.id}`, 'PUT', { value })) await showSettings(id)
+    if (await act(`${setting.name}: ${value}`, `/settings/${setting.id}`, 'PUT', { value }))
+      await showSettings(id)
   }
   $('settings').parentElement.hidden = settings.length === 0
   $('settings').replaceChildren(
@@ -256,7 +283,7 @@ async function showSettings(id) {
       h(
         'fieldset',
         {},
-        h('legend', {}, `${setting.name} `, h('small', {}, `${round(setting.value)} ${setting.unit ?? ''}`)),
+        h('legend', {}, `${setting.name} `, h('small', {}, `${round(setting.value)} ${unitOf(setting)}`)),
         numberForm(setting, setting.name, set(setting)),
       ),
     ),
@@ -276,11 +303,12 @@ async function show() {
   const next = controllers.find(({ id }) => id === wanted) ?? controllers[0]
   if (!next) return
   if (next.id !== shown?.id) await begin(next.id)
-  const [values, pins] = await Promise.all([ask(`/${next.id}/values`), ask(`/${next.id}/pins`)])
+  const state = statePoint ? ask(`/${next.id}/values?name=${statePoint}`) : []
+  const [signals, more, pins] = await Promise.all([ask(`/${next.id}/values`), state, ask(`/${next.id}/pins`)])
   shown = next
   document.title = `${shown.name} · Imitation`
   showControllers()
-  showPlant(new Map(values.map((value) => [value.name, value])))
+  showPlant(new Map([...signals, ...more].map((value) => [value.name, value])))
   showClock()
   showSwitches()
   showLevers()
@@ -295,7 +323,7 @@ async function live() {
     if (!document.hidden) {
       try {
         await refresh()
-        if ($('problem').textContent.startsWith('No connection')) tell('')
+        if ($('site').classList.replace('lost', 'heard')) tell('')
       } catch (error) {
         failed(error)
       }

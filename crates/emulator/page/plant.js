@@ -59,16 +59,23 @@ class Look {
   }
 }
 
+/** Three voltages with one unit. */
+function voltages(phases) {
+  const known = phases.filter((volts) => volts !== undefined)
+  const [scale, decimals, unit] = Math.max(0, ...known) < 1000 ? [1, 0, 'V'] : [1000, 2, 'kV']
+  const shown = phases.map((volts) => (volts === undefined ? '–' : (volts / scale).toFixed(decimals)))
+  return `${shown.join('/')} ${unit}`
+}
+
 /** A source with a letter or a wave in it, its voltages, its frequency, and what it gives. */
 function source(look, id, name, x, letter) {
-  const volts = look.phases(id).map((phase) => (phase === undefined ? '–' : phase.toFixed(0)))
   const wave = `M${x - 9} 42c4 -10 9 -10 9 0s5 10 9 0`
   return [
     text(x, 14, 'strong middle', name),
     element('circle', { cx: x, cy: 42, r: 18, class: look.isLive(id) ? 'live' : 'dead' }),
     letter ? text(x, 46, 'strong middle', letter) : path(wave, 'body'),
     line(`M${x} 60V86`, look.isLive(id)),
-    text(x + 26, 40, '', volts.join(' / '), 'V'),
+    text(x + 26, 40, '', voltages(look.phases(id))),
     text(x + 26, 55, '', shown(look.get(`${id}.frequency`), 1)),
     ...(look.get(`${id}.power.active`) ? [text(x + 26, 70, '', shown(look.get(`${id}.power.active`)))] : []),
   ]
@@ -134,8 +141,7 @@ function genset(look) {
     ...source(look, 'genset', 'Genset', 230, 'G'),
     ...breaker(look, 'mains', 'Mains breaker', 50, 86, live.mains, 'breaker.mains'),
     ...breaker(look, 'genset', 'Genset breaker', 230, 86, live.genset, 'breaker.genset'),
-    line('M50 110V140', fed && look.isClosed('mains')),
-    line('M230 110V140', fed && look.isClosed('genset')),
+    line('M50 110V140M230 110V140', fed),
     path('M20 140H340', fed ? 'live bus' : 'dead'),
     ...load(140, 140, 'Load', fed, fed ? `${power.toFixed(0)} kW` : 'without supply'),
     ...supplies(look, 190),
@@ -150,7 +156,7 @@ function transferSwitch(look) {
   const side = (number, x) => [
     ...source(look, `src${number}`, `Source ${number}`, x),
     ...breaker(look, `src${number}`, `QS${number}`, x, 86, live[`src${number}`], `switch.qs${number}`),
-    line(`M${x} 110V150`, fed[number] && look.isClosed(`src${number}`)),
+    line(`M${x} 110V150`, fed[number]),
     path(`M${x - 35} 150H${x + 65}`, fed[number] ? 'live bus' : 'dead'),
     ...load(x, 150, `Load ${number}`, fed[number], fed[number] ? 'fed' : 'without supply'),
     text(x - 35, 214, 'dim', look.word(`state.src${number}`)),
@@ -158,10 +164,10 @@ function transferSwitch(look) {
   return [
     226,
     ...side(1, 50),
-    ...side(2, 240),
-    line(tied ? 'M115 150H205' : 'M115 150H145l26 -14M175 150H205', tied && (fed[1] || fed[2])),
-    text(160, 176, 'middle', 'QTIE'),
-    text(160, 190, 'strong middle', tied ? 'closed' : 'open'),
+    ...side(2, 225),
+    line(tied ? 'M115 150H190' : 'M115 150H138l24 -14M167 150H190', tied && (fed[1] || fed[2])),
+    text(152, 176, 'middle', 'QTIE'),
+    text(152, 190, 'strong middle', tied ? 'closed' : 'open'),
   ]
 }
 

@@ -89,7 +89,7 @@ impl Device {
             model: model.to_owned(),
             seed,
             answer_delay,
-            player: config.scenario.as_ref().map(|scenario| Player::new(scenario, config)),
+            player: config.scenario.as_ref().map(|scenario| Player::new(scenario, model, seed)),
         };
         device.stir();
         device.play();

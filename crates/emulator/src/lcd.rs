@@ -17,6 +17,7 @@ impl Canvas {
         Self { rows: [0; HEIGHT] }
     }
 
+    #[cfg(test)]
     pub(crate) fn is_set(&self, x: usize, y: usize) -> bool {
         x < WIDTH && self.rows.get(y).is_some_and(|row| row >> x & 1 == 1)
     }
@@ -27,11 +28,8 @@ impl Canvas {
         for (position, letter) in (column..).zip(letters) {
             for (y, bits) in glyph(letter).into_iter().enumerate() {
                 let Some(row) = self.rows.get_mut(line * 8 + y) else { return };
-                for x in 0..5 {
-                    // The font is written as it looks: its leftmost pixel is the highest bit.
-                    let pixel = u128::from(bits >> (4 - x) & 1);
-                    *row |= pixel << (position * 6 + x);
-                }
+                // The font is written as it looks: its leftmost pixel is the highest of five bits.
+                *row |= u128::from(bits.reverse_bits() >> 3) << (position * 6);
             }
         }
     }
@@ -80,16 +78,29 @@ impl Canvas {
     pub(crate) fn datakom_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(WIDTH * HEIGHT / 8);
         for page in 0..HEIGHT / 8 {
-            for pair in 0..WIDTH / 2 {
-                let column = |x: usize| -> u8 {
-                    (0..8).map(|bit| u8::from(self.is_set(x, HEIGHT - 1 - 8 * page - bit)) << bit).sum()
-                };
-                bytes.push(column(2 * pair + 1));
-                bytes.push(column(2 * pair));
+            let rows: [u128; 8] = std::array::from_fn(|bit| self.rows[HEIGHT - 1 - 8 * page - bit]);
+            for x in (0..WIDTH).step_by(8) {
+                let columns = transposed(rows.map(|row| (row >> x) as u8));
+                for pair in columns.chunks_exact(2) {
+                    bytes.extend_from_slice(&[pair[1], pair[0]]);
+                }
             }
         }
         bytes
     }
+}
+
+/// Rows of eight pixels as columns: bit `c` of byte `r` becomes bit `r` of byte `c`.
+///
+/// The picture is taken for every image of the registers; pixel by pixel it would cost more than all the rest.
+fn transposed(rows: [u8; 8]) -> [u8; 8] {
+    let mut block = u64::from_le_bytes(rows);
+    // Bits change places across the diagonal, then pairs of them, then fours.
+    for (distance, mask) in [(7, 0x00AA_00AA_00AA_00AA), (14, 0x0000_CCCC_0000_CCCC), (28, 0xF0F0_F0F0)] {
+        let differing = (block ^ (block >> distance)) & mask;
+        block ^= differing ^ (differing << distance);
+    }
+    block.to_le_bytes()
 }
 
 /// Rows of a letter from the top, five pixels each; a letter the font does not have is a box.
@@ -197,6 +208,18 @@ mod tests {
         canvas.text_right(7, "a text that is much longer than a line");
         assert!((126..128).all(|x| !canvas.is_set(x, 0)));
         assert!(canvas.is_set(1, 56), "the line starts at the left edge");
+    }
+
+    #[test]
+    fn eight_rows_become_eight_columns() {
+        let rows = [0b1000_0001, 2, 0, 0b0101_0101, 0, 0, 0xFF, 0x80];
+        let columns = transposed(rows);
+        for (r, row) in rows.into_iter().enumerate() {
+            for (c, column) in columns.into_iter().enumerate() {
+                assert_eq!(row >> c & 1, column >> r & 1, "{r} {c}");
+            }
+        }
+        assert_eq!(transposed(columns), rows);
     }
 
     #[test]

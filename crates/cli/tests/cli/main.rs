@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod command;
+mod control;
 mod decode;
 mod frame;
 mod guide;

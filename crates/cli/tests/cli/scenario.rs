@@ -34,7 +34,7 @@ fn one_that_holds_ends_with_0() {
     assert!(call.out().starts_with("tcp://127.0.0.1:") && call.out().lines().count() == 1, "{}", call.out());
     let told = call.err();
     let lines: Vec<&str> = told.lines().map(|line| line.trim_start().split_once(" s  ").unwrap().1).collect();
-    assert_eq!(lines.first(), Some(&"A start: datakom-d"));
+    assert_eq!(lines.first(), Some(&"A start: datakom-d, D-500, seed 1"));
     assert_eq!(lines.last(), Some(&"all 3 expectations held"));
     for line in ["command test", "  state.engine preheat (Engine preheat)", "held: breaker.mains.closed"] {
         assert!(lines.contains(&line), "no \"{line}\" in\n{told}");

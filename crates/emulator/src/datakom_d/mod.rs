@@ -18,6 +18,8 @@ mod service;
 mod settings;
 mod status;
 mod story;
+#[cfg(test)]
+mod transitions;
 mod watch;
 
 use std::time::Duration;
@@ -37,6 +39,7 @@ use demand::{Causes, Peak};
 use identity::Identity;
 use keys::Menu;
 use mains::Mains;
+use operation::Operation::{MainsBreakerTimer, WaitBeforeFuel};
 use readings::Readings;
 use regulation::Regulation;
 use sequence::{Demand, Sensed, Sequence, Source};
@@ -175,6 +178,12 @@ impl DatakomD {
         let time = self.plant.time;
         let scheduled = interval > 0.0 && time >= interval && time % interval < duration;
         self.scene.exerciser || scheduled
+    }
+
+    /// Other gensets on the bus bar are to run with this one.
+    fn calls_others(&self) -> bool {
+        let others = matches!(self.plant.lever("busbar.gensets"), Some(Position::Number(_)));
+        others && (WaitBeforeFuel..=MainsBreakerTimer).contains(&self.sequence.operation())
     }
 
     fn genset_healthy(&self) -> bool {

@@ -101,7 +101,7 @@ pub(super) struct Sequence {
     attempts_left: u8,
     /// What a parallel status waited for has come: the breaker that the load has left opens, or the other one closes.
     ready: bool,
-    /// The genset breaker closes in step with the mains, or has done so.
+    /// Genset and mains have met in step, or are about to.
     in_parallel: bool,
     /// It could not be synchronized this time: the load moves with a break.
     unsynchronized: bool,
@@ -214,17 +214,19 @@ impl Sequence {
     }
 
     fn mains_breaker(&self, demand: Demand, sensed: Sensed) -> bool {
+        // Beside a closed genset breaker it stays closed where the two have met in step, and never closes.
+        let lawful = !sensed.genset_breaker || self.in_parallel && sensed.mains_breaker;
         match self.operation {
             OffLoad => {
                 let leaves = demand.on_load() && sensed.genset_healthy && !self.without_break(sensed);
-                !leaves && demand.source != Source::Nothing && !sensed.genset_breaker
+                !leaves && demand.source != Source::Nothing && lawful
             }
             GensetBreakerActivation => self.in_parallel,
             TransferToGenset => !self.ready,
             SynchronizingBack => self.ready,
             Synchronizing | PeakLopping | Exporting | TransferToMains => true,
             GensetBreakerTimer | OnLoad | SlaveOnLoad | MainsBreakerTimer => false,
-            _ => demand.source != Source::Nothing && !sensed.genset_breaker,
+            _ => demand.source != Source::Nothing && lawful,
         }
     }
 
@@ -426,7 +428,7 @@ impl Sequence {
         }
         self.in_parallel = match next {
             GensetBreakerActivation => before == Synchronizing,
-            OnLoad | SlaveOnLoad => self.in_parallel,
+            OnLoad | SlaveOnLoad | OffLoad | StopWithCooldown | ImmediateStop => self.in_parallel,
             _ => next.carries_load(),
         };
         self.operation = next;

@@ -66,6 +66,7 @@ fn output_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16
     let running = unit.readings.running;
     let hot = plant.engine.coolant > COOLING_FROM;
     let (genset, mains) = (&plant.genset_breaker, &plant.mains_breaker);
+    let calls_others = unit.calls_others();
     // A second on, a second off.
     let flashing = shown.count() > 0 && plant.time % 2.0 < 1.0;
     [
@@ -92,6 +93,7 @@ fn output_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16
         (23, running && hot),
         (24, running),
         (25, running),
+        (27, calls_others),
         (33, unit.shedding),
         (35, unit.shedding),
     ]
@@ -138,6 +140,7 @@ fn state_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16,
         (67, matches!(operation, IdleBeforeStop | ImmediateStop | Stopping)),
         (69, unit.readings.remote_start),
         (78, operation == OnLoad),
+        (79, unit.calls_others()),
         (108, unit.readings.mains_alive),
     ]
 }

@@ -259,6 +259,41 @@ mod tests {
         assert_eq!(active(&watches), []);
     }
 
+    /// A rule as the page lists it.
+    fn row(rule: &Rule) -> String {
+        let profile = busbar_profile::builtin("datakom-d").unwrap();
+        let label = &profile.point("warning_alarms").unwrap().bit(rule.bit).unwrap().label;
+        let class = match rule.class {
+            Shutdown => "shutdown",
+            LoadDump => "load dump",
+            Warning => "warning",
+        };
+        let armed = match rule.armed {
+            Always => "always",
+            Running => "engine running",
+            Protected => "protections live",
+            Parallel => "both breakers closed",
+        };
+        let limit = match rule.limit {
+            Below(id, _) => format!("below `{id}`"),
+            Above(id, _) => format!("above `{id}`"),
+            True => "while it is so".to_owned(),
+        };
+        let after = match rule.after {
+            Seconds(seconds) => format!("{seconds} s"),
+            Setting(id) => format!("`{id}`"),
+        };
+        format!("| {:03} | {label} | {class} | {armed} | {limit} | {after} |", rule.bit)
+    }
+
+    #[test]
+    fn the_page_lists_what_is_watched() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/imitation/datakom-d.md");
+        let page = std::fs::read_to_string(path).unwrap();
+        let rows: Vec<_> = RULES.iter().map(row).collect();
+        assert!(page.contains(&rows.join("\n")), "the page lacks this:\n{}", rows.join("\n"));
+    }
+
     #[test]
     fn an_alarm_needs_its_delay_and_goes_with_its_hysteresis() {
         let mut watches = watches();

@@ -23,10 +23,16 @@ impl Climate {
     }
 
     /// degC outside.
+    pub(super) fn outside(&self) -> f64 {
+        self.outside + self.weather.value()
+    }
+
+    /// degC outside.
     pub(super) fn step(&mut self, dt: f64, time: f64, random: &mut Random) -> f64 {
         // The warmest hour is three in the afternoon.
         let day = 4.0 * ((Self::hour(time) - 9.0) / 24.0 * TAU).sin();
         approach(&mut self.outside, self.held.unwrap_or(19.0 + day), 120.0, dt);
-        self.outside + self.weather.step(dt, random)
+        self.weather.step(dt, random);
+        self.outside()
     }
 }

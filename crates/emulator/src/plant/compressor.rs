@@ -83,6 +83,7 @@ pub(crate) struct Compressor {
 impl Compressor {
     pub(crate) fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
+        let climate = Climate::new(&mut random);
         Self {
             time: 0.0,
             engine: Engine::new(&mut random),
@@ -92,16 +93,16 @@ impl Compressor {
             battery: Battery::new(&mut random),
             tank: Tank::new(random.between(70.0, 85.0)),
             refilling: false,
-            ambient: 19.0,
-            intake: 21.0,
-            fuel_temperature: 24.0,
+            ambient: climate.outside(),
+            intake: climate.outside() + 2.0,
+            fuel_temperature: climate.outside() + 3.0,
             fuel_pressure: 0.0,
             emergency_stop: false,
             door_open: false,
             ecu_silent: false,
             senders: Senders::default(),
             discharge_senders: DischargeSenders::default(),
-            climate: Climate::new(&mut random),
+            climate,
             lift_pump: Drift::new(4.0, 3.0, &mut random),
             random,
         }

@@ -162,7 +162,9 @@ impl Engine {
 
     pub(super) fn step(&mut self, dt: f64, inputs: &Inputs, random: &mut Random) {
         self.turn(dt, inputs, random);
-        self.heat(dt, inputs);
+        // A jolt at the shaft is not burned.
+        let given = if self.is_running() { inputs.load.clamp(0.0, most_kw(self.speed)) } else { 0.0 };
+        self.heat(dt, inputs, given);
         self.leak(dt);
 
         let thin = 1.0 - 0.004 * (self.oil - 40.0);
@@ -171,7 +173,7 @@ impl Engine {
         approach(&mut self.oil_pressure, pressure * pumped, 0.8, dt);
 
         self.burn = match self.is_running() {
-            true => 2.6 * self.speed / RATED_RPM + 0.25 * inputs.load.max(0.0),
+            true => 2.6 * self.speed / RATED_RPM + 0.25 * given,
             false => 0.0,
         };
         self.burned += self.burn * dt / 3600.0;
@@ -195,8 +197,9 @@ impl Engine {
         self.firing &= fuel;
         match (self.firing, inputs.starter) {
             (true, _) => self.run(dt, inputs, random),
-            (false, Some(strength)) => self.crank(dt, fuel, strength),
-            (false, None) => self.coast(dt, fuel),
+            // The starter's pinion overruns: it does not brake what turns faster.
+            (false, Some(strength)) if self.speed <= CRANKING_RPM => self.crank(dt, fuel, strength),
+            (false, _) => self.coast(dt, fuel),
         }
     }
 
@@ -256,9 +259,10 @@ impl Engine {
         }
     }
 
-    fn heat(&mut self, dt: f64, inputs: &Inputs) {
+    /// `given` are the kW that it burns fuel for.
+    fn heat(&mut self, dt: f64, inputs: &Inputs, given: f64) {
         // kW into the coolant: a diesel gives it nearly as much as the shaft.
-        let combustion = if self.is_running() { 4.0 + 0.55 * inputs.load.max(0.0) } else { 0.0 };
+        let combustion = if self.is_running() { 4.0 + 0.55 * given } else { 0.0 };
         let heater = if inputs.heater { 1.8 } else { 0.0 };
         let radiator = if self.wear.radiator_blocked { BLOCKED_RADIATOR } else { RADIATOR };
         let circulating =
@@ -268,7 +272,7 @@ impl Engine {
         let casing = 0.03 * (self.coolant - inputs.ambient);
         self.coolant += (combustion + heater - cooled - steam - casing) * dt / HEAT_CAPACITY;
 
-        let hotter = if self.is_running() { 6.0 + 14.0 * inputs.load.max(0.0) / RATED_KW } else { -4.0 };
+        let hotter = if self.is_running() { 6.0 + 14.0 * given / RATED_KW } else { -4.0 };
         approach(&mut self.oil, self.coolant + hotter, 150.0, dt);
     }
 

@@ -119,6 +119,7 @@ pub(crate) struct Plant {
 impl Plant {
     pub(crate) fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
+        let climate = Climate::new(&mut random);
         let mut plant = Self {
             time: 0.0,
             mains: Feed::default(),
@@ -131,8 +132,8 @@ impl Plant {
             batteries: [Battery::new(&mut random), Battery::new(&mut random)],
             tank: Tank::new(random.between(70.0, 85.0)),
             sisters: Sisters::new(&mut random),
-            ambient: 20.0,
-            canopy: 21.0,
+            ambient: climate.outside(),
+            canopy: climate.outside() + 2.0,
             excitation: Regulation::default(),
             emergency_stop: false,
             remote_start: false,
@@ -141,7 +142,7 @@ impl Plant {
             grid: Grid::new(&mut random),
             load: Load::new(&mut random),
             alternator: Alternator::new(),
-            climate: Climate::new(&mut random),
+            climate,
             random,
         };
         // One step fills the meters, so that the first image is a whole one.
@@ -169,8 +170,9 @@ impl Plant {
             load: self.genset.total_active(),
             ambient: self.canopy,
         };
+        let speed = self.engine.speed;
         self.engine.step(dt, &inputs, &mut self.random);
-        self.electricity(dt);
+        self.electricity(dt, speed);
 
         let running = self.engine.is_running();
         let supplied = self.mains.average_voltage() > SUPPLY;
@@ -232,7 +234,8 @@ impl Plant {
         self.senders.read(&self.engine, &self.tank)
     }
 
-    fn electricity(&mut self, dt: f64) {
+    /// `speed` is that of the shaft before the engine had its say.
+    fn electricity(&mut self, dt: f64, speed: f64) {
         self.alternator.step(dt, self.engine.speed, &self.excitation, &self.genset);
         let (voltage, frequency) = self.grid.step(dt, self.mains.total_active(), &mut self.random);
         if self.coupling.meet(dt, self.is_parallel(), &self.synchronism()) {
@@ -240,7 +243,7 @@ impl Plant {
         }
         let parallel = self.is_parallel();
         if parallel {
-            self.drag(dt, voltage, frequency);
+            self.drag(dt, speed, voltage, frequency);
         }
         let terminals = self.terminals(parallel.then_some(voltage));
         let (mains_load, genset_load) = self.flows(dt, parallel, (voltage, frequency), terminals);
@@ -261,9 +264,9 @@ impl Plant {
     }
 
     /// One busbar has one frequency and one voltage, and the grid is the stronger.
-    fn drag(&mut self, dt: f64, voltage: [f64; 3], frequency: f64) {
-        let missing = frequency / HERTZ_PER_RPM - self.engine.speed;
-        self.engine.speed += missing.clamp(-DRAG * dt, DRAG * dt);
+    fn drag(&mut self, dt: f64, speed: f64, voltage: [f64; 3], frequency: f64) {
+        let missing = frequency / HERTZ_PER_RPM - speed;
+        self.engine.speed = speed + missing.clamp(-DRAG * dt, DRAG * dt);
         self.alternator.voltage = live_average(voltage);
     }
 

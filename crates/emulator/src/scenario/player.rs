@@ -12,7 +12,6 @@ use super::order::Order;
 use super::report::Seen;
 use super::text::in_words;
 use super::{Action, Check, CheckVerdict, Event, EventKind, Place, Report, Scenario, Step, Trigger};
-use crate::config::Config;
 use crate::device::{Device, STEP};
 
 /// A scenario under way.
@@ -30,8 +29,8 @@ pub(crate) struct Player {
 }
 
 impl Player {
-    /// A scenario before its first moment; that is when [`Player::go_on`] is called first.
-    pub(crate) fn new(scenario: &Scenario, config: &Config) -> Self {
+    /// A scenario on a controller of this model, before its first moment; that is when [`Player::go_on`] is called first.
+    pub(crate) fn new(scenario: &Scenario, model: &str, seed: u64) -> Self {
         Self {
             steps: scenario.steps.iter().cloned().collect(),
             clock: scenario.clock,
@@ -44,8 +43,8 @@ impl Player {
                 file: scenario.file.clone(),
                 title: scenario.title.clone(),
                 controller: scenario.controller().to_owned(),
-                model: config.model.clone(),
-                seed: config.seed,
+                model: model.to_owned(),
+                seed,
                 steps: scenario.steps.len(),
                 ..Report::default()
             },

@@ -16,8 +16,8 @@ pub struct Report {
     pub title: String,
     /// Key of the controller's profile.
     pub controller: String,
-    /// Its model, where the scenario names one.
-    pub model: Option<String>,
+    /// Its model.
+    pub model: String,
     /// The seed of everything that is left to chance.
     pub seed: u64,
     /// Whether everything that was expected came; none while it is played.

@@ -179,6 +179,31 @@ fn what_nobody_can_tell_neither_holds_nor_fails() {
 }
 
 #[test]
+fn conditions_bind_as_people_read_them() {
+    let pins = [("fuel_level", "12.5"), ("unit_mode", "AUTO"), ("operation_status", "Cranking")];
+    let pins = pins.map(|(point, value)| (point.to_owned(), value.to_owned())).to_vec();
+    let device = Device::new(&Config { pins, ..Config::default() }).unwrap();
+    for (text, holds) in [
+        ("fuel.level == 12.50", true),
+        ("fuel.level != 12.5", false),
+        ("fuel.level < 12.5", false),
+        ("fuel.level<=12.5", true),
+        ("fuel.level > 12.49", true),
+        ("fuel_level >= 12.51", false),
+        ("mode == auto and state.engine == stopped", false),
+        ("mode == auto and state.engine != stopped", true),
+        ("mode == auto or mode == off and state.engine == stopped", true),
+        ("(mode == auto or mode == off) and state.engine == stopped", false),
+        ("not mode == off and operation_status == cranking", true),
+        ("not (mode == off or operation_status == cranking)", false),
+        ("not not breaker.mains.closed", true),
+    ] {
+        let condition = parse::condition(device.profile(), text).unwrap();
+        assert_eq!(condition.holds(&device), holds, "{text}");
+    }
+}
+
+#[test]
 fn a_command_is_judged_by_its_verdict() {
     let order = |lines: &str| checks(&play(&format!("[[steps]]\nat = \"1s\"\n{lines}\n")));
     assert_eq!(order("command = \"stop\""), ["1.1 held of the command stop that it is done"]);
@@ -435,5 +460,56 @@ fn heads_are_checked_too() {
             findings.contains(&format!("a.toml:{expected}")),
             "{head}\n  found  {findings}\n  wanted a.toml:{expected}"
         );
+    }
+}
+
+/// Pieces that a condition may be made of, right or wrong.
+const PIECES: [&str; 24] = [
+    "state.engine",
+    "mode",
+    "fuel.level",
+    "engine.running",
+    "warning_alarms",
+    "==",
+    "!=",
+    "<",
+    ">=",
+    "=",
+    "loaded",
+    "auto",
+    "12.5",
+    "-1",
+    "not",
+    "and",
+    "or",
+    "(",
+    ")",
+    "within",
+    "for",
+    "10s",
+    "99999999999h",
+    "é\u{202E}",
+];
+
+proptest::proptest! {
+    #[test]
+    fn any_condition_is_read_or_refused_at_a_place_in_it(picks in proptest::collection::vec(0..PIECES.len(), 0..12)) {
+        let text = picks.iter().map(|pick| PIECES[*pick]).collect::<Vec<_>>().join(" ");
+        let profile = busbar_profile::builtin("datakom-d").unwrap();
+        if let Err(mistake) = parse::wish(profile, &text) {
+            proptest::prop_assert!(text.get(mistake.span).is_some() && !mistake.help.is_empty());
+        }
+    }
+
+    #[test]
+    fn any_file_is_read_or_refused(at in 0_usize..400, length in 0_usize..30, with in "[ -~\n]{0,12}") {
+        let text = format!(
+            "{HEAD}[[steps]]\nat = \"1s\"\nmains = \"failed\"\ninject = [\"over_load\"]\nset = {{ fuel_level = 3 }}\n\
+             expect = [\"engine.running within 5s\"]\n[[steps]]\nwhen = \"(mode == auto) or engine.running\"\n\
+             within = \"3s\"\ncommand = \"channel\"\nargs = {{ channel = 2 }}\nverdict = \"done\"\n"
+        );
+        let mut changed = text.clone();
+        changed.replace_range(at.min(text.len())..(at + length).min(text.len()), &with);
+        let _ = Scenario::parse("a.toml", &changed);
     }
 }

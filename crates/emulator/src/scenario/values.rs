@@ -13,6 +13,8 @@ use super::text::{duration, in_words, shown};
 /// The text of a file and what was found wrong with it.
 pub(super) struct Notes<'a> {
     text: &'a str,
+    /// Where its lines begin.
+    lines: Vec<usize>,
     findings: Collector<'a>,
     clean: bool,
 }
@@ -27,7 +29,8 @@ pub(super) struct Entry<'t, 'i> {
 
 impl<'a> Notes<'a> {
     pub(super) fn new(file: &'a str, text: &'a str) -> Self {
-        Self { text, findings: Collector::new(file, text), clean: true }
+        let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(newline, _)| newline + 1));
+        Self { text, lines: lines.collect(), findings: Collector::new(file, text), clean: true }
     }
 
     pub(super) fn add(&mut self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) {
@@ -52,12 +55,10 @@ impl<'a> Notes<'a> {
     }
 
     pub(super) fn place(&self, offset: usize) -> Place {
-        let before = self.text.get(..offset).unwrap_or(self.text);
-        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        Place {
-            line: before.matches('\n').count() + 1,
-            column: before[line_start..].trim_start_matches('\u{FEFF}').chars().count() + 1,
-        }
+        let line = self.lines.partition_point(|start| *start <= offset);
+        let start = line.checked_sub(1).and_then(|index| self.lines.get(index)).copied().unwrap_or_default();
+        let before = self.text.get(start..offset).unwrap_or_default();
+        Place { line, column: before.trim_start_matches('\u{FEFF}').chars().count() + 1 }
     }
 
     /// Where a part of a text value stands in the file; the whole value where escapes moved it.

@@ -1,5 +1,6 @@
 //! The ECU of an ACC1700CAN: what it sends over J1939 beside its measurements.
 
+use crate::levers::Position;
 use crate::plant::Compressor;
 
 use super::causes::{Verdict, when};
@@ -31,6 +32,10 @@ pub(super) struct Filter {
     pub(super) burns: bool,
     /// It never gets hot enough: somebody has to see to it.
     pub(super) needs_a_person: bool,
+    /// Somebody has forbidden it to burn.
+    pub(super) inhibited: bool,
+    /// Somebody has asked it to burn, and it does as it is asked.
+    pub(super) by_hand: bool,
 }
 
 impl Ecu {
@@ -39,21 +44,26 @@ impl Ecu {
     }
 
     /// `watched` is whether the engine has had time to build up its oil pressure.
-    pub(super) fn step(&mut self, plant: &Compressor, talks: bool, watched: bool) {
-        self.talks = talks;
-        if !talks {
+    pub(super) fn step(&mut self, plant: &Compressor, watched: bool) {
+        self.talks = !plant.ecu_silent;
+        if !self.talks {
             return;
         }
+        let senders = plant.readings();
+        let blind = senders.coolant.is_none() || senders.oil_pressure.is_none() || senders.speed.is_none();
         let beyond = |(degc, bar): (f64, f64)| {
-            plant.engine.coolant > degc || watched && plant.engine.oil_pressure < bar
+            senders.coolant.is_some_and(|coolant| coolant > degc)
+                || watched && senders.oil_pressure.is_some_and(|pressure| pressure < bar)
         };
         self.filter = Filter {
             failed: plant.filter.has_failed(),
             waits: plant.filter.is_waiting(),
             burns: plant.filter.is_regenerating(),
             needs_a_person: plant.filter.needs_a_person(),
+            inhibited: plant.filter.is_inhibited(),
+            by_hand: plant.lever("dpf.regeneration") == Some(Position::Word("by_hand")),
         };
-        self.warns = beyond(WARNS_AT) || self.filter.failed || self.filter.needs_a_person;
+        self.warns = beyond(WARNS_AT) || blind || self.filter.failed || self.filter.needs_a_person;
         self.stops = beyond(STOPS_AT);
     }
 

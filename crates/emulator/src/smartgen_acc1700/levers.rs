@@ -1,8 +1,10 @@
-//! What people can do at an ACC1700 itself: its contacts, its menu and the line to its ECU. All else is the plant's.
+//! What people can make happen at an ACC1700: the levers of its plant, and those of the unit itself.
 
+use std::sync::LazyLock;
 use std::time::Duration;
 
 use crate::levers::{Lever, Position, Word};
+use crate::plant::COMPRESSOR_LEVERS;
 
 use super::Acc1700;
 use super::sequence::Status;
@@ -15,21 +17,13 @@ const fn service(id: &'static str, name: &'static str) -> Lever {
 }
 
 /// In the order in which people are shown them.
-pub(super) const LEVERS: [Lever; 14] = [
-    Lever::of_words(
-        "door",
-        "Canopy door",
-        &[Word::new("closed", "The door is shut"), Word::new("open", "Somebody has opened the door")],
-    ),
+pub(super) static LEVERS: LazyLock<Vec<Lever>> = LazyLock::new(|| [COMPRESSOR_LEVERS, &OF_THE_UNIT].concat());
+
+const OF_THE_UNIT: [Lever; 12] = [
     Lever::of_words(
         "input.4",
         "Switch at input 4",
         &[Word::new("open", "The contact is open"), Word::new("closed", "The contact is closed")],
-    ),
-    Lever::of_words(
-        "ecu",
-        "Line to the ECU",
-        &[Word::new("normal", "The ECU is heard"), Word::new("silent", "Nothing comes from the ECU")],
     ),
     Lever::of_words(
         "heating",
@@ -55,31 +49,31 @@ pub(super) const LEVERS: [Lever; 14] = [
 pub(super) fn lever(unit: &Acc1700, id: &str) -> Option<Position> {
     let word = |second: bool, words: [&'static str; 2]| Some(Position::Word(words[usize::from(second)]));
     match id {
-        "door" => word(unit.hands.door_open, ["closed", "open"]),
-        "input.4" => word(unit.hands.switch_closed, ["open", "closed"]),
-        "ecu" => word(unit.ecu_silent, ["normal", "silent"]),
+        "input.4" => word(unit.switch_closed, ["open", "closed"]),
         "heating" => word(unit.is_heating(), ["off", "on"]),
-        _ => {
-            let left = unit.services.left(unit.running_seconds());
-            Some(Position::Number(*left.get(numbered(id)?)? as f64 / 3600.0))
-        }
+        _ => match numbered(id) {
+            Some(service) => {
+                let left = unit.services.left(unit.running_seconds());
+                // To the hundredth of an hour, as people would write it.
+                left.get(service).map(|seconds| Position::Number((*seconds as f64 / 36.0).round() / 100.0))
+            }
+            None => unit.plant.lever(id),
+        },
     }
 }
 
-/// Pulls one of them; whether it is one of them.
-pub(super) fn pull(unit: &mut Acc1700, id: &str, to: Position) -> bool {
+/// Pulls one of them.
+pub(super) fn pull(unit: &mut Acc1700, id: &str, to: Position) {
     let is = |word: &'static str| to == Position::Word(word);
     match id {
-        "door" => unit.hands.door_open = is("open"),
-        "input.4" => unit.hands.switch_closed = is("closed"),
-        "ecu" => unit.ecu_silent = is("silent"),
+        "input.4" => unit.switch_closed = is("closed"),
         // A menu that only a unit at rest offers.
         "heating" => {
             let on = is("on") && unit.sequence.status() == Status::Standby;
             unit.heating_left = if on { unit.setup.heating } else { Duration::ZERO };
         }
         _ => {
-            let Some(service) = numbered(id) else { return false };
+            let Some(service) = numbered(id) else { return unit.plant.pull(id, to) };
             let seconds = match to {
                 Position::Number(hours) => Some((hours * 3600.0) as u64),
                 Position::Word(_) => None,
@@ -88,7 +82,6 @@ pub(super) fn pull(unit: &mut Acc1700, id: &str, to: Position) -> bool {
             unit.services.set(service, seconds, total);
         }
     }
-    true
 }
 
 /// `maintenance.1` as 0.

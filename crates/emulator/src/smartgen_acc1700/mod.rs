@@ -100,9 +100,8 @@ pub(crate) struct Acc1700 {
     outputs: [bool; 4],
     story: bool,
     scene: Scene,
-    hands: Hands,
-    /// Nothing comes from the ECU.
-    ecu_silent: bool,
+    /// The switch at input 4.
+    switch_closed: bool,
     /// How much longer somebody's heating goes on.
     heating_left: Duration,
     events: u16,
@@ -135,8 +134,7 @@ impl Acc1700 {
             outputs: [false; 4],
             story,
             scene: Scene::NOTHING,
-            hands: Hands::default(),
-            ecu_silent: false,
+            switch_closed: false,
             heating_left: Duration::ZERO,
             events: random.between(12.0, 40.0) as u16,
             run_began: seconds - random.between(1200.0, 9000.0) as u64,
@@ -192,10 +190,14 @@ impl Acc1700 {
     fn measure(&mut self, dt: Duration) {
         let watched = self.sequence.status().is_watched();
         if let Some(ecu) = &mut self.ecu {
-            ecu.step(&self.plant, !self.ecu_silent, watched);
+            ecu.step(&self.plant, watched);
         }
         self.readings = Readings::of(&self.plant, self.model, self.ecu.as_ref().is_some_and(Ecu::talks));
-        let hands = Hands { door_open: self.hands.door_open || self.scene.attendant, ..self.hands };
+        let hands = Hands {
+            emergency_stop: self.plant.emergency_stop,
+            switch_closed: self.switch_closed,
+            door_open: self.plant.door_open || self.scene.attendant,
+        };
         self.inputs.step(dt, &self.plant, hands, &self.setup);
     }
 

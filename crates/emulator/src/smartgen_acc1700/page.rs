@@ -5,10 +5,12 @@ use std::path::Path;
 use busbar_profile::{Profile, Setting};
 
 use super::PROFILE;
+use super::levers::LEVERS;
 use super::sequence::{Cause, Status, TRANSITIONS};
 use super::setup::Setup;
 
 const DIAGRAM: [&str; 2] = ["```mermaid\n", "```\n"];
+const LEVERS_LIST: [&str; 2] = ["<!-- levers -->\n", "<!-- end of levers -->\n"];
 const SETTINGS: [&str; 2] = ["<!-- settings -->\n", "<!-- end of settings -->\n"];
 
 /// Statuses in the order of their codes, and the ways between them.
@@ -48,6 +50,20 @@ fn words(cause: Cause) -> &'static str {
     }
 }
 
+/// A row a lever.
+fn levers() -> String {
+    let mut lines = vec!["| lever | what it is | positions |".to_owned(), "| --- | --- | --- |".to_owned()];
+    for lever in LEVERS.iter() {
+        let words = lever.words.iter().map(|word| format!("`{}`", word.id));
+        let numbers = lever.numbers.map(|numbers| {
+            format!("{} to {} {}", numbers.min, numbers.max, numbers.unit).trim_end().to_owned()
+        });
+        let positions: Vec<_> = words.chain(numbers).collect();
+        lines.push(format!("| `{}` | {} | {} |", lever.id, lever.name, positions.join(", ")));
+    }
+    lines.join("\n") + "\n"
+}
+
 /// A row a setting; those that are there once a number are one.
 fn settings(profile: &Profile) -> String {
     let mut rows: Vec<(String, &Setting, Vec<String>)> = Vec::new();
@@ -66,7 +82,8 @@ fn settings(profile: &Profile) -> String {
         let numbers = if values.len() > 1 { format!(", N 1 to {}", values.len()) } else { String::new() };
         lines.push(format!(
             "| `{id}`{numbers} | {} | {} | {} | {} | {} |",
-            setting.name.replace(" 1", " N"),
+            // The number behind what it is about, not a code.
+            if values.len() > 1 { setting.name.replacen(" 1", " N", 1) } else { setting.name.clone() },
             values.join(", "),
             setting.min,
             setting.max,
@@ -90,12 +107,13 @@ fn replaced(page: &str, [begin, end]: [&str; 2], text: &str) -> String {
 }
 
 #[test]
-fn the_page_draws_the_table_of_transitions_and_lists_the_settings() {
+fn the_page_draws_the_table_of_transitions_and_lists_levers_and_settings() {
     let profile = busbar_profile::builtin(PROFILE).unwrap();
     assert_eq!(statuses().len(), 16);
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/imitation/smartgen-acc1700.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let wanted = replaced(&page, DIAGRAM, &diagram(profile));
+    let wanted = replaced(&wanted, LEVERS_LIST, &levers());
     let wanted = replaced(&wanted, SETTINGS, &settings(profile));
     if std::env::var_os("UPDATE").is_some() {
         std::fs::write(&path, wanted).unwrap();

@@ -52,20 +52,25 @@ pub(super) struct Readings {
 
 impl Readings {
     pub(super) fn of(plant: &Compressor, model: Model, ecu_talks: bool) -> Self {
-        let sent = |value: f64| if ecu_talks { Reading::Value(value) } else { Reading::Absent };
-        let oil_pressure = plant.engine.oil_pressure * 100.0;
-        let [fuel_level, discharge_temperature, discharge_pressure] =
-            [plant.tank.percent(), plant.air.temperature, plant.air.pressure].map(Reading::Value);
+        let (engine, discharge) = (plant.readings(), plant.discharge());
+        let oil_pressure = engine.oil_pressure.map(|bar| bar * 100.0);
+        // A pickup without pulses looks like an engine that stands.
+        let speed = Some(engine.speed.unwrap_or_default());
+        let sent = |value: Option<f64>| match value {
+            Some(value) if ecu_talks => Reading::Value(value),
+            _ => Reading::Absent,
+        };
+        let fuel_level = wired(engine.fuel_level);
+        let pressure = wired(discharge.pressure);
+        let temperature = wired(discharge.temperature);
         let (speed, coolant, oil_pressure, first, second) = match model {
             Model::Acc1700 => {
-                let speed = Reading::Value(plant.engine.speed);
-                let (coolant, oil) = (Reading::Value(plant.engine.coolant), Reading::Value(oil_pressure));
-                (speed, coolant, oil, coolant, oil)
+                let (coolant, oil) = (wired(engine.coolant), wired(oil_pressure));
+                (wired(speed), coolant, oil, coolant, oil)
             }
             Model::Acc1700Can => {
-                let (coolant, oil) = (sent(plant.engine.coolant), sent(oil_pressure));
-                let separator = Reading::Value(plant.air.separator_loss);
-                (sent(plant.engine.speed), coolant, oil, Reading::Absent, separator)
+                let separator = wired(discharge.separator_loss);
+                (sent(speed), sent(engine.coolant), sent(oil_pressure), Reading::Absent, separator)
             }
         };
         let [battery, charger] = plant.voltages();
@@ -74,12 +79,12 @@ impl Readings {
             coolant,
             oil_pressure,
             fuel_level,
-            discharge_pressure,
-            discharge_temperature,
-            engine_load: if model == Model::Acc1700 { Reading::Absent } else { sent(plant.load()) },
+            discharge_pressure: pressure,
+            discharge_temperature: temperature,
+            engine_load: if model == Model::Acc1700 { Reading::Absent } else { sent(Some(plant.load())) },
             battery,
             charger,
-            sensors: [first, second, fuel_level, discharge_temperature, discharge_pressure],
+            sensors: [first, second, fuel_level, temperature, pressure],
             of_the_engine: if model == Model::Acc1700 { 2 } else { 0 },
         }
     }
@@ -99,4 +104,9 @@ impl Readings {
             }
         }
     }
+}
+
+/// What comes over a wire of its own.
+fn wired(value: Option<f64>) -> Reading {
+    value.map_or(Reading::Broken, Reading::Value)
 }

@@ -105,7 +105,9 @@ fn engine_indicators(unit: &Acc1700, bank: &mut Bank) {
     let engine_fault = [ECU_SHUTDOWN, ECU_WARNING].into_iter().any(|alarm| unit.alarms.is_active(alarm));
     let mut engine = unit.alarms.word(FILTER_FAULT.0);
     engine.set(1, filter.waits);
+    engine.set(2, filter.inhibited);
     engine.set(3, filter.burns);
+    engine.set(4, filter.by_hand);
     engine.set(5, filter.needs_a_person);
     engine.set(7, filter.burns);
     engine.set(8, unit.sequence.status() == Status::Preheat);

@@ -126,6 +126,8 @@ pub(super) struct Sequence {
     timer: Duration,
     attempts_left: u8,
     waits_for_pressure: bool,
+    /// How long it has waited for the pressure.
+    waited: Duration,
     /// Latched until [`Sequence::acknowledge`].
     failed_to_start: bool,
     /// Times the engine ran, since the unit was fitted.
@@ -139,6 +141,7 @@ impl Sequence {
             timer: Duration::ZERO,
             attempts_left: 0,
             waits_for_pressure: false,
+            waited: Duration::ZERO,
             failed_to_start: false,
             starts,
         }
@@ -186,8 +189,9 @@ impl Sequence {
     }
 
     pub(super) fn step(&mut self, dt: Duration, sensed: Sensed, setup: &Setup) {
-        if !self.waits(sensed, setup) {
-            self.timer = self.timer.saturating_sub(dt);
+        match self.waits(sensed, setup) {
+            true => self.waited += dt,
+            false => self.timer = self.timer.saturating_sub(dt),
         }
         let mut cause = self.cause(sensed, setup);
         while let Some(found) = cause {
@@ -213,6 +217,7 @@ impl Sequence {
 
     fn waits(&self, sensed: Sensed, setup: &Setup) -> bool {
         self.status == Status::Cooling
+            && self.waited < setup.stop_pressure_time
             && sensed.pressure.is_some_and(|pressure| pressure > setup.stop_pressure)
     }
 
@@ -235,6 +240,7 @@ impl Sequence {
         self.status = next;
         self.timer = setup.delay(next);
         self.waits_for_pressure = false;
+        self.waited = Duration::ZERO;
     }
 }
 
@@ -372,6 +378,22 @@ mod tests {
         assert!(!bench.sequence.waits_for_pressure());
         let seen = bench.walk(Standby, |status| if status < WaitForStop { RUNNING } else { DEAD });
         assert_eq!(seen, [Cooling, StopIdle, EnergiseToStop, WaitForStop, AfterStop, Standby]);
+    }
+
+    #[test]
+    fn a_stop_waits_no_longer_than_it_is_set_to() {
+        let mut bench = Bench::loaded();
+        bench.setup = Setup::with(&[("stop_pressure_time", "60")]);
+        bench.react(Cause::StopKey);
+        for _ in 0..600 {
+            bench.step(Sensed { pressure: Some(700.0), ..RUNNING });
+        }
+        assert_eq!((bench.status(), bench.sequence.seconds_left()), (Cooling, 20));
+        for _ in 0..50 {
+            bench.step(Sensed { pressure: Some(700.0), ..RUNNING });
+        }
+        assert_eq!((bench.status(), bench.sequence.seconds_left()), (Cooling, 15));
+        assert!(!bench.sequence.waits_for_pressure());
     }
 
     #[test]

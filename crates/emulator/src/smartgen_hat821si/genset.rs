@@ -1,89 +1,341 @@
-//! The start output: register 1092 with delay 1093.
+//! The start of gensets: register 1092 with delay 1093, why they are started, and which of two it is.
 
 use std::time::Duration;
 
-/// Before the start output comes on.
-const START_DELAY: Duration = Duration::from_secs(3);
-/// Before it goes off.
-const STOP_DELAY: Duration = Duration::from_secs(5);
-/// How long the set takes from the start signal to its rated voltage.
-const RUN_UP: Duration = Duration::from_secs(8);
+use busbar_profile::DateTime;
 
-/// States with their codes. Scheduled runs (2 and 3) need a schedule, and none is set.
+use crate::settings::Settings;
+
+use super::alarms::{Alarm, Board};
+use super::diagram::Edge;
+use super::schedule::Window;
+use super::timer::{Countdown, Lasting};
+
+/// Delays, the calendar and what there is, as they are set.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Limits {
+    start: Duration,
+    stop: Duration,
+    /// From the start signal until the set must run.
+    supply: Duration,
+    /// Behind which source there is one.
+    behind: [bool; 2],
+    choice: Choice,
+    /// How long a set runs before the other one takes its turn.
+    turns: [Duration; 2],
+    run: Option<Window>,
+    runs_on_load: bool,
+    not_run: Option<Window>,
+}
+
+/// Which of two sets is started.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Choice {
+    /// They take turns.
+    #[default]
+    Cycle,
+    /// That of the master.
+    Master,
+    /// The one that has run less.
+    Balanced,
+}
+
+impl Limits {
+    pub(super) fn of(settings: &Settings) -> Self {
+        let minutes = |id| Duration::from_secs_f64(60.0 * settings.number(id));
+        let window = |name| settings.is_on(name).then(|| Window::of(settings, name));
+        Self {
+            start: settings.seconds("genset_start_delay"),
+            stop: settings.seconds("genset_stop_delay"),
+            supply: settings.seconds("genset_supply_time"),
+            behind: match settings.number("gensets") as u8 {
+                0 => [false; 2],
+                1 => [false, true],
+                _ => [true; 2],
+            },
+            choice: match settings.number("genset_choice") as u8 {
+                0 => Choice::Cycle,
+                1 => Choice::Master,
+                _ => Choice::Balanced,
+            },
+            turns: [minutes("genset_1_turn"), minutes("genset_2_turn")],
+            run: window("scheduled_run"),
+            runs_on_load: settings.number("scheduled_run") as u8 == 2,
+            not_run: window("scheduled_not_run"),
+        }
+    }
+
+    fn are_two(&self) -> bool {
+        self.behind == [true; 2]
+    }
+}
+
+/// What the controller knows when it decides about a start.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scene<'a> {
+    pub(super) now: DateTime,
+    pub(super) auto: bool,
+    /// Which sources are the master ones.
+    pub(super) masters: [bool; 2],
+    /// Which sources are available, and which of them hang on their gensets.
+    pub(super) available: [bool; 2],
+    pub(super) on_genset: [bool; 2],
+    /// A genset feeds a section in place of its mains.
+    pub(super) serves: bool,
+    /// Contacts of the site.
+    pub(super) on_load_input: bool,
+    pub(super) off_load_input: bool,
+    pub(super) inhibited: bool,
+    /// Sets that run.
+    pub(super) runs: [bool; 2],
+    pub(super) limits: &'a Limits,
+}
+
+/// States with their codes; the two of the calendar are worked out when they are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
-enum State {
+pub(super) enum State {
     StartDelay = 0,
     StopDelay = 1,
     Started = 8,
     Standby = 9,
 }
 
-/// The controller's side of the genset, and how far the set has come.
+impl State {
+    /// Every way from one to another, with what leads there.
+    pub(super) const WAYS: &[Edge<Self>] = &[
+        Edge::new(Self::Standby, Self::StartDelay, "a cause to start"),
+        Edge::new(Self::StartDelay, Self::Standby, "no cause any more"),
+        Edge::new(Self::StartDelay, Self::Started, "start delay over"),
+        Edge::new(Self::Started, Self::StopDelay, "no cause any more"),
+        Edge::new(Self::StopDelay, Self::Started, "a cause again"),
+        Edge::new(Self::StopDelay, Self::Standby, "stop delay over"),
+    ];
+}
+
+const NOT_SCHEDULED: u16 = 2;
+const SCHEDULED: u16 = 3;
+
+/// Why a genset is to run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Causes {
+    pub(super) on_load: bool,
+    pub(super) off_load: bool,
+    pub(super) mains_abnormal: bool,
+    pub(super) scheduled: bool,
+}
+
+impl Causes {
+    fn any(self) -> bool {
+        self != Self::default()
+    }
+}
+
+/// The controller's side of the gensets.
 #[derive(Clone, Debug)]
 pub(super) struct Genset {
     state: State,
-    timer: Duration,
-    signalled_for: Duration,
+    timer: Countdown,
+    causes: Causes,
+    /// A remote command has asked for it.
+    commanded: bool,
+    inhibited: bool,
+    not_scheduled: Option<Duration>,
+    scheduled: Option<Duration>,
+    /// The set that is to run: 0 behind source 1, 1 behind source 2.
+    chosen: usize,
+    /// The set that goes on until the chosen one runs.
+    relieved: Option<usize>,
+    signals: [bool; 2],
+    /// How long a set was asked to run and did not.
+    missing: [Lasting; 2],
+    /// How long each has run in all, and in this turn.
+    hours: [Duration; 2],
+    turn: Duration,
+    carries: bool,
+    choice: Choice,
+    two: bool,
 }
 
 impl Genset {
     pub(super) fn new() -> Self {
-        Self { state: State::Standby, timer: Duration::ZERO, signalled_for: Duration::ZERO }
+        Self {
+            state: State::Standby,
+            timer: Countdown::default(),
+            causes: Causes::default(),
+            commanded: false,
+            inhibited: false,
+            not_scheduled: None,
+            scheduled: None,
+            chosen: 1,
+            relieved: None,
+            signals: [false; 2],
+            missing: [Lasting::default(); 2],
+            hours: [Duration::ZERO; 2],
+            turn: Duration::ZERO,
+            carries: false,
+            choice: Choice::Cycle,
+            two: false,
+        }
     }
 
-    pub(super) fn step(&mut self, dt: Duration, wanted: bool) {
-        self.timer = self.timer.saturating_sub(dt);
-        let elapsed = self.timer.is_zero();
-        (self.state, self.timer) = match (self.state, wanted) {
-            (State::Standby, true) => (State::StartDelay, START_DELAY),
-            (State::StartDelay, true) if elapsed => (State::Started, Duration::ZERO),
-            (State::StartDelay, false) => (State::Standby, Duration::ZERO),
-            (State::Started, false) => (State::StopDelay, STOP_DELAY),
-            (State::StopDelay, true) => (State::Started, Duration::ZERO),
-            (State::StopDelay, false) if elapsed => (State::Standby, Duration::ZERO),
-            (same, _) => (same, self.timer),
+    /// A remote command: start, or stop.
+    pub(super) fn command(&mut self, start: bool) {
+        self.commanded = start;
+    }
+
+    pub(super) fn step(&mut self, dt: Duration, scene: Scene<'_>, board: &mut Board) {
+        self.weigh(scene);
+        let limits = scene.limits;
+        let works = [0, 1].map(|set| limits.behind[set] && !board.has(Alarm::genset(set)));
+        let wanted = self.causes.any() && works != [false; 2];
+        self.timer.step(dt);
+        let elapsed = self.timer.is_over();
+        match (self.state, wanted) {
+            (State::Standby, true) => self.enter(State::StartDelay, limits.start),
+            (State::StartDelay, true) if elapsed => self.enter(State::Started, Duration::ZERO),
+            (State::StartDelay, false) => self.enter(State::Standby, Duration::ZERO),
+            (State::Started, false) => self.enter(State::StopDelay, limits.stop),
+            (State::StopDelay, true) => self.enter(State::Started, Duration::ZERO),
+            (State::StopDelay, false) if elapsed => self.enter(State::Standby, Duration::ZERO),
+            _ => {}
+        }
+        self.choose(dt, scene, works);
+        self.watch(dt, scene, board);
+    }
+
+    /// Works out why one is to run.
+    fn weigh(&mut self, scene: Scene<'_>) {
+        let limits = scene.limits;
+        (self.choice, self.two) = (limits.choice, limits.are_two());
+        self.not_scheduled = limits.not_run.and_then(|window| window.left(scene.now));
+        self.scheduled = limits.run.and_then(|window| window.left(scene.now));
+        self.inhibited = scene.inhibited;
+        let by_mains = |source: usize| scene.available[source] && !scene.on_genset[source];
+        // Once there are mains again it goes on until they have taken over.
+        let relieved = (by_mains(0) || by_mains(1)) && !(self.causes.mains_abnormal && scene.serves);
+        let mains_abnormal = scene.auto && !relieved;
+        let may = !self.inhibited;
+        let by_clock = may && self.not_scheduled.is_none();
+        self.causes = Causes {
+            on_load: may && scene.on_load_input,
+            off_load: may && (self.commanded || scene.off_load_input),
+            mains_abnormal: by_clock && mains_abnormal,
+            scheduled: by_clock && scene.auto && self.scheduled.is_some(),
         };
-        self.signalled_for = if self.start_output() { self.signalled_for + dt } else { Duration::ZERO };
+        self.carries = self.causes.on_load || self.causes.scheduled && limits.runs_on_load;
+    }
+
+    fn enter(&mut self, next: State, delay: Duration) {
+        debug_assert!(Edge::cause(State::WAYS, self.state, next).is_some(), "{:?} {next:?}", self.state);
+        if next == State::Started && self.state == State::StartDelay {
+            self.turn = Duration::ZERO;
+        }
+        self.state = next;
+        self.timer = Countdown::of(delay);
+    }
+
+    /// Which of two it is, and what the start outputs say.
+    fn choose(&mut self, dt: Duration, scene: Scene<'_>, works: [bool; 2]) {
+        let limits = scene.limits;
+        let started = matches!(self.state, State::Started | State::StopDelay);
+        if !started {
+            self.relieved = None;
+            self.chosen = match limits.choice {
+                Choice::Cycle => self.chosen,
+                Choice::Master => usize::from(!scene.masters[0]),
+                Choice::Balanced => usize::from(self.hours[1] < self.hours[0]),
+            };
+        } else if works == [true; 2] && limits.choice == Choice::Cycle && self.state == State::Started {
+            self.turn += dt;
+            if self.turn >= limits.turns[self.chosen] {
+                self.relieved = Some(self.chosen);
+                self.chosen = 1 - self.chosen;
+                self.turn = Duration::ZERO;
+            }
+        }
+        if !works[self.chosen] && works[1 - self.chosen] {
+            self.chosen = 1 - self.chosen;
+            self.turn = Duration::ZERO;
+        }
+        if scene.runs[self.chosen] {
+            self.relieved = None;
+        }
+        self.signals =
+            [0, 1].map(|set| started && works[set] && (set == self.chosen || self.relieved == Some(set)));
+    }
+
+    /// A set that is asked to run and does not is told of.
+    fn watch(&mut self, dt: Duration, scene: Scene<'_>, board: &mut Board) {
+        for set in 0..2 {
+            if scene.runs[set] {
+                self.hours[set] += dt;
+            }
+            let fails = self.signals[set] && !scene.runs[set];
+            if self.missing[set].step(dt, fails, scene.limits.supply) {
+                board.latch(Alarm::genset(set));
+            }
+        }
     }
 
     /// Bit 500.15.
     pub(super) fn start_output(&self) -> bool {
-        matches!(self.state, State::Started | State::StopDelay)
+        self.signals != [false; 2]
     }
 
-    /// It has its voltage.
-    pub(super) fn is_running(&self) -> bool {
-        self.signalled_for >= RUN_UP
+    /// The start signals of the sets behind source 1 and source 2.
+    pub(super) fn signals(&self) -> [bool; 2] {
+        self.signals
     }
 
+    /// What runs is to carry load even while its mains are there.
+    pub(super) fn carries(&self) -> bool {
+        self.carries
+    }
+
+    pub(super) fn causes(&self) -> Causes {
+        self.causes
+    }
+
+    /// Bits 0 to 2 of word 508: how the set was chosen that runs instead of the mains.
+    pub(super) fn choice_bit(&self) -> Option<u16> {
+        let chosen = self.two && self.causes.mains_abnormal && self.start_output();
+        chosen.then_some(match self.choice {
+            Choice::Cycle => 0,
+            Choice::Balanced => 1,
+            Choice::Master => 2,
+        })
+    }
+
+    /// Bit 508.4.
+    pub(super) fn is_not_scheduled(&self) -> bool {
+        self.not_scheduled.is_some()
+    }
+
+    /// Bit 508.10.
+    pub(super) fn is_inhibited(&self) -> bool {
+        self.inhibited
+    }
+
+    /// Register 1092: the windows of the calendar under their own codes.
     pub(super) fn status(&self) -> u16 {
-        self.state as u16
+        match self.state {
+            State::Standby if self.not_scheduled.is_some() => NOT_SCHEDULED,
+            State::Started if self.causes.scheduled => SCHEDULED,
+            state => state as u16,
+        }
     }
 
-    pub(super) fn seconds_left(&self) -> u64 {
-        self.timer.as_millis().div_ceil(1000) as u64
+    /// Register 1093.
+    pub(super) fn seconds_left(&self) -> u16 {
+        let window = match self.status() {
+            NOT_SCHEDULED => self.not_scheduled,
+            SCHEDULED => self.scheduled,
+            _ => None,
+        };
+        window.map_or(self.timer, Countdown::of).seconds()
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn start_and_stop_take_their_delays() {
-        let second = Duration::from_secs(1);
-        let mut genset = Genset::new();
-        let mut walk = |wanted, seconds| {
-            (0..seconds).for_each(|_| genset.step(second, wanted));
-            (genset.status(), genset.seconds_left(), genset.start_output(), genset.is_running())
-        };
-        assert_eq!(walk(true, 1), (0, 3, false, false));
-        assert_eq!(walk(false, 1), (9, 0, false, false), "no longer wanted before it was started");
-        assert_eq!(walk(true, 4), (8, 0, true, false));
-        assert_eq!(walk(true, 8), (8, 0, true, true));
-        assert_eq!(walk(false, 1), (1, 5, true, true));
-        assert_eq!(walk(true, 1), (8, 0, true, true), "wanted again");
-        assert_eq!(walk(false, 6), (9, 0, false, false));
-    }
-}
+mod tests;

@@ -1,35 +1,27 @@
 //! SmartGen HAT821SI: two sources, two bus sections with twelve load switches each, and the tie between them.
 //!
 //! Power-on finds the controller in automatic and remote mode, each source on its own section, the tie open and every
-//! load switch closed. Where the manual is silent this is what the imitation does:
-//! - the digits of a transfer command are QS1, QTIE and QS2: the codes that are missing, 010 and 111, are then the
-//!   useless one and the forbidden one;
-//! - both sources are masters: each feeds its section while both are good. With one master alone that one feeds both
-//!   sections, and a section whose source has failed is fed over the tie. The master coils are levels, like
-//!   automatic / manual: 0000h makes a source the standby one. So are the remote outputs: 0000h switches one off. For
-//!   all other coils 0000h does nothing;
-//! - remote commands work in automatic and in manual mode, and not while somebody has set the controller to local. In
-//!   automatic mode a remote transfer stays until a source fails or returns, a master is set, or automatic mode is set
-//!   again. A transfer onto a source that is not available is ignored, and so is one while a switch has failed;
-//! - in manual mode nothing is transferred by itself;
-//! - a switch that has not moved within its time has failed, and holds off transfers until the alarms are reset;
-//! - a load switch falls when its section has been dead for a second. In automatic mode they come back one a second;
-//!   in manual mode the window asks first, and cancelling it leaves them open;
-//! - the genset stands behind source 2 and takes over there when its mains are dead. In automatic mode it starts by
-//!   itself when neither source is available, and runs until source 1 is; a remote stop does not end that;
-//! - registers without a scale: A, kW, kvar and kVA as they are, power factors in hundredths, percentages and angles
-//!   in tenths, switch numbers from 1 with 0 for none; parallel mode is 0, as sources are never in parallel;
-//! - the expansion modules are wired to the load switches: inputs 1 and 2 closed, 3 and 4 tripped, 5 and 6 in work
-//!   position, outputs 2 and 3 the closing outputs. Output module 1 carries the remote outputs, 4 nothing.
+//! load switch closed. `docs/imitation/smartgen-hat821si.md` draws its states, lists what can be made to happen to it,
+//! and says what it does where the manual is silent.
 
+mod alarms;
+mod control;
 mod counters;
+mod diagram;
 mod genset;
+mod inputs;
+mod levers;
 mod loads;
 mod plant;
+mod protection;
 mod render;
-mod section;
-mod source;
+mod schedule;
+mod shedding;
 mod story;
+mod supervision;
+mod switches;
+mod sync;
+mod timer;
 mod transfer;
 
 use std::time::Duration;
@@ -38,17 +30,26 @@ use busbar_modbus::ExceptionCode;
 use busbar_profile::DateTime;
 
 use crate::bank::Bank;
+use crate::levers::{Lever, Position};
 use crate::panel::Panel;
 use crate::random::Random;
 use crate::rules::Refusals;
+use crate::settings::Settings;
 
+use alarms::{Alarm, Board};
+use control::{Bars, Control, NORMAL};
 use counters::SupplyTime;
 use genset::Genset;
-use loads::Loads;
-use plant::{Plant, Positions, Switch};
-use source::Supervision;
+use inputs::{Input, Inputs};
+use loads::{Around, Loads};
+use plant::{Meter, Outputs, Plant, Source};
+use protection::Protection;
+use shedding::{Burden, Shedding};
 use story::Scene;
-use transfer::Sequence;
+use supervision::{Sensed, Supervision};
+use switches::{Drive, FEEDERS, Positions, Switch};
+use sync::Synchroscope;
+use transfer::{Failure, Sequence, View};
 
 const AUTO: u16 = 15_004;
 const S1_MASTER: u16 = 15_005;
@@ -71,35 +72,61 @@ const FIRST_LOAD: u16 = 15_040;
 const LAST_LOAD: u16 = 15_087;
 
 const REMOTE_OUTPUTS: usize = 13;
-/// Both sources on their own sections.
-const NORMAL: Positions = Positions::of(1, 0, 1);
-/// The feeder of the story, load switch 2-7, as section and index.
-const STORY_FEEDER: (usize, usize) = (1, 6);
-/// How long the horn sounds for a new alarm.
-const HORN: Duration = Duration::from_secs(30);
+
+/// Timers and thresholds as they are set, by the part that acts upon them.
+#[derive(Clone, Debug, Default)]
+struct Limits {
+    supervision: supervision::Limits,
+    transfer: transfer::Limits,
+    sync: sync::Limits,
+    loads: loads::Limits,
+    shedding: shedding::Limits,
+    protection: protection::Limits,
+    genset: genset::Limits,
+    restores: bool,
+    /// How long the horn sounds for a new alarm.
+    horn: Duration,
+}
+
+impl Limits {
+    fn of(settings: &Settings) -> Self {
+        Self {
+            supervision: supervision::Limits::of(settings),
+            transfer: transfer::Limits::of(settings),
+            sync: sync::Limits::of(settings),
+            loads: loads::Limits::of(settings),
+            shedding: shedding::Limits::of(settings),
+            protection: protection::Limits::of(settings),
+            genset: genset::Limits::of(settings),
+            restores: settings.is_on("auto_restore"),
+            horn: settings.seconds("horn_time"),
+        }
+    }
+}
 
 /// The controller and its switchgear.
 #[derive(Clone, Debug)]
 pub(crate) struct Hat821si {
     plant: Plant,
+    limits: Limits,
     passed: Duration,
     /// What the calendar said at power-on.
     epoch: DateTime,
+    inputs: Inputs,
+    board: Board,
+    meters: [Meter; 2],
     supervision: [Supervision; 2],
+    protection: Protection,
+    control: Control,
+    synchroscope: Synchroscope,
     sequence: Sequence,
     loads: [Loads; 2],
+    shedding: Shedding,
     genset: Genset,
     auto: bool,
     /// The key on the front says local: remote commands are ignored.
     local: bool,
     masters: [bool; 2],
-    /// Where the switches shall stand.
-    target: Positions,
-    /// A remote transfer in automatic mode holds while exactly these sources are available.
-    held: Option<[bool; 2]>,
-    remote_start: bool,
-    /// The genset runs because neither source was available.
-    mains_abnormal: bool,
     remote_outputs: [bool; REMOTE_OUTPUTS],
     alarms: usize,
     horn: Duration,
@@ -119,20 +146,27 @@ impl Hat821si {
         for (source, time) in plant.sources.iter_mut().zip(source_supply) {
             source.has_served(time, random.between(0.6, 0.8));
         }
+        let mut inputs = Inputs::default();
+        inputs.hear(&plant);
         Self {
+            meters: plant.sources.each_ref().map(Source::meter),
             plant,
+            limits: Limits::default(),
             passed: Duration::ZERO,
-            supervision: [Supervision::new(), Supervision::new()],
+            epoch: DateTime::FIRST,
+            inputs,
+            board: Board::default(),
+            supervision: [Supervision::new(0), Supervision::new(1)],
+            protection: Protection::new(NORMAL),
+            control: Control::new(NORMAL),
+            synchroscope: Synchroscope::default(),
             sequence: Sequence::new(),
-            loads: [Loads::new(), Loads::new()],
+            loads: [Loads::new(0), Loads::new(1)],
+            shedding: Shedding::default(),
             genset: Genset::new(),
             auto: true,
             local: false,
             masters: [true; 2],
-            target: NORMAL,
-            held: None,
-            remote_start: false,
-            mains_abnormal: false,
             remote_outputs: [false; REMOTE_OUTPUTS],
             alarms: 0,
             horn: Duration::ZERO,
@@ -140,7 +174,6 @@ impl Hat821si {
             load_supply: source_supply.map(|own| SupplyTime::new(own, &mut random)),
             story,
             scene: Scene::NOTHING,
-            epoch: DateTime::FIRST,
         }
     }
 
@@ -149,66 +182,109 @@ impl Hat821si {
         Self { epoch, ..self }
     }
 
+    fn now(&self) -> DateTime {
+        self.epoch.plus(self.passed)
+    }
+
     fn available(&self) -> [bool; 2] {
         self.supervision.each_ref().map(Supervision::is_available)
     }
 
-    /// Where automatic mode wants the switches; nowhere else while there is no source.
-    fn automatic(&self) -> Positions {
-        match (self.available(), self.masters) {
-            ([true, true], [true, false]) | ([true, false], _) => Positions::of(1, 1, 0),
-            ([true, true], [false, true]) | ([false, true], _) => Positions::of(0, 1, 1),
-            ([true, true], _) => NORMAL,
-            ([false, false], _) => self.target,
-        }
+    /// Which sources are there only because a genset stands in for their mains.
+    fn guests(&self) -> [bool; 2] {
+        let asked = self.genset.carries();
+        self.plant.sources.each_ref().map(|source| source.is_on_genset() && !asked)
     }
 
-    fn choose_target(&mut self) {
-        let failed = self.sequence.has_failed();
-        if failed || self.held.is_some_and(|then| then != self.available()) {
-            self.held = None;
-        }
-        if !self.auto {
-            if failed {
-                // What could not be done by hand is not tried again by itself.
-                self.target = self.plant.positions();
+    /// Remote commands are ignored.
+    fn is_deaf(&self) -> bool {
+        self.local || self.inputs.has(Input::RemoteInhibit)
+    }
+
+    /// What the outputs do now. What hangs on a module that is silent is off.
+    fn outputs(&self) -> Outputs {
+        let [_, first, second, third] = self.inputs.output_modules_cut;
+        let mut loads = self.loads.each_ref().map(Loads::drives);
+        for (side, cut) in [first, second].into_iter().enumerate() {
+            for (feeder, drive) in loads[side].iter_mut().enumerate() {
+                let cut = match drive {
+                    Some(Drive::Open) if feeder >= inputs::OWN_OPENING => third,
+                    _ => cut,
+                };
+                *drive = drive.filter(|_| !cut);
             }
-        } else if self.held.is_none() {
-            self.target = self.automatic();
+        }
+        Outputs {
+            switches: self.sequence.drives(),
+            loads,
+            start: self.genset.signals(),
+            on_load: self.genset.carries(),
+            shed: self.shedding.steps(),
         }
     }
 
-    fn choose_genset(&mut self) {
-        let [first, second] = self.available();
-        if !self.auto || first {
-            self.mains_abnormal = false;
-        } else if !second {
-            self.mains_abnormal = true;
+    fn burden(&self) -> Burden {
+        let parts = [0, 1].map(|source: usize| {
+            let on_genset = self.plant.sources[source].is_on_genset();
+            self.meters[source].power / self.limits.shedding.capacity(source, on_genset).max(1.0)
+        });
+        Burden { parts, feeds: self.plant.feeds() }
+    }
+
+    fn bars(&self) -> Bars {
+        let has = |input| self.inputs.has(input);
+        let sources = [has(Input::Qs1QtieInhibit), has(Input::Qs2QtieInhibit)];
+        Bars {
+            locked: self.protection.locks(&self.board),
+            inhibited: Positions::by(|switch| match switch {
+                Switch::Qs1 => has(Input::S1CloseInhibit) || sources[0],
+                Switch::Qtie => has(Input::QtieCloseInhibit) || sources[0] || sources[1],
+                Switch::Qs2 => has(Input::S2CloseInhibit) || sources[1],
+            }),
+            not_closed: self.stuck(Drive::Close),
+            now: self.plant.positions(),
+            no_supply_over_tie: [has(Input::S1SupplyQtieInhibit), has(Input::S2SupplyQtieInhibit)],
         }
     }
 
-    fn transfer(&mut self, to: Positions) {
-        let sources = [Switch::Qs1, Switch::Qs2].map(|switch| to.is_closed(switch));
-        let dead = sources.iter().zip(self.available()).any(|(closes, available)| *closes && !available);
-        if dead || self.sequence.has_failed() {
-            return;
+    /// The switches that have an alarm because they did not close, or did not open.
+    fn stuck(&self, drive: Drive) -> Positions {
+        Positions::by(|switch| self.board.has(Alarm::stuck(switch, drive)))
+    }
+
+    fn wishes(&self) -> control::Scene {
+        control::Scene {
+            auto: self.auto,
+            masters: self.masters,
+            available: self.available(),
+            guests: self.guests(),
+            restores: self.limits.restores || self.inputs.has(Input::AutoRestore),
+            forced_open: self.protection.forces_open(&self.board),
+            bars: self.bars(),
         }
-        self.target = to;
-        self.held = self.auto.then_some(self.available());
     }
 
     fn set_auto(&mut self, on: bool) {
         self.auto = on;
-        self.held = None;
+        self.control.reconsider();
     }
 
     fn set_master(&mut self, source: usize, on: bool) {
         self.masters[source] = on;
-        self.held = None;
+        self.control.reconsider();
+    }
+
+    fn transfer(&mut self, to: Positions) {
+        let wishes = self.wishes();
+        if self.stuck(Drive::Open) == Positions::OPEN {
+            self.control.transfer(to, wishes);
+        }
     }
 
     fn acknowledge(&mut self) {
-        self.sequence.acknowledge();
+        self.board.reset();
+        self.protection.acknowledge();
+        self.plant.relays = [false; 3];
         self.loads.iter_mut().for_each(Loads::acknowledge);
         self.horn = Duration::ZERO;
     }
@@ -217,8 +293,8 @@ impl Hat821si {
     fn press(&mut self, coil: u16) {
         match coil {
             ALARM_RESET => self.acknowledge(),
-            GENSET_START => self.remote_start = true,
-            GENSET_STOP => self.remote_start = false,
+            GENSET_START => self.genset.command(true),
+            GENSET_STOP => self.genset.command(false),
             TRANSFER_000 => self.transfer(Positions::OPEN),
             TRANSFER_101 => self.transfer(NORMAL),
             TRANSFER_110 => self.transfer(Positions::of(1, 1, 0)),
@@ -229,45 +305,120 @@ impl Hat821si {
             WINDOW_CANCEL => self.loads.iter_mut().for_each(|loads| loads.answer(false)),
             FIRST_LOAD..=LAST_LOAD => {
                 let number = usize::from(coil - FIRST_LOAD);
-                let (section, within) = (number / (2 * plant::FEEDERS), number % (2 * plant::FEEDERS));
-                self.loads[section].drive(within / 2, within % 2 == 0);
+                let (side, within) = (number / (2 * FEEDERS), number % (2 * FEEDERS));
+                let drive = if within % 2 == 0 { Drive::Close } else { Drive::Open };
+                self.loads[side].drive(within / 2, drive, &self.limits.loads, &self.board);
             }
             _ => {}
         }
     }
 
-    fn play(&mut self) {
-        if !self.story {
-            return;
-        }
-        let scene = Scene::at(self.passed.as_secs_f64());
-        let before = std::mem::replace(&mut self.scene, scene);
-        self.plant.sources[0].trouble = scene.source_1;
-        self.plant.switches[Switch::Qtie as usize].jammed = scene.tie_jammed;
-        self.local = scene.attended;
-        let (section, feeder) = STORY_FEEDER;
-        if scene.feeder_fault && !before.feeder_fault {
-            self.loads[section].trip(feeder);
-        }
-        if scene.repaired && !before.repaired {
-            self.acknowledge();
-            self.loads[section].drive(feeder, true);
+    /// `before` are the sources that had a guest before this step.
+    fn judge(&mut self, dt: Duration, before: [bool; 2]) {
+        for (source, supervision) in self.supervision.iter_mut().enumerate() {
+            let sensed = Sensed {
+                meter: &self.meters[source],
+                broken_wire: self.protection.broken_wire(source),
+                reverse_power: self.board.has(Alarm::reverse_power(source)),
+                lost: before[source] && !self.plant.sources[source].is_on_genset(),
+            };
+            supervision.step(dt, sensed, &self.limits.supervision);
         }
     }
 
+    fn protect(&mut self, dt: Duration, drives: [Option<Drive>; 3]) {
+        let [first, second] = &self.meters;
+        let scene = protection::Scene {
+            meters: [first, second],
+            has_phases: self.supervision.each_ref().map(Supervision::has_phases),
+            burden: self.burden(),
+            positions: self.plant.positions(),
+            relays: self.plant.relays,
+            drives,
+            inputs: &self.inputs,
+            supervision: &self.limits.supervision,
+            sync_fails: self.sequence.sync_fails(),
+        };
+        self.protection.step(dt, scene, &self.limits.protection, &mut self.board);
+    }
+
+    fn ask_for_gensets(&mut self, dt: Duration) {
+        let guests = self.guests();
+        let serves = self.plant.feeds().iter().any(|by| by[0] && guests[0] || by[1] && guests[1]);
+        let scene = genset::Scene {
+            now: self.now(),
+            auto: self.auto,
+            masters: self.masters,
+            available: self.available(),
+            on_genset: self.plant.sources.each_ref().map(Source::is_on_genset),
+            serves,
+            on_load_input: self.inputs.has(Input::StartOnLoad),
+            off_load_input: self.inputs.has(Input::StartOffLoad),
+            inhibited: self.inputs.has(Input::StartInhibit),
+            runs: self.plant.engines.each_ref().map(plant::Engine::has_voltage),
+            limits: &self.limits.genset,
+        };
+        self.genset.step(dt, scene, &mut self.board);
+    }
+
+    fn transfer_on(&mut self, dt: Duration) {
+        let [first, second] = &self.meters;
+        self.synchroscope.step(dt, [first, second]);
+        let wishes = self.wishes();
+        self.control.step(wishes);
+        let faultless = self.supervision.iter().all(Supervision::is_faultless);
+        let view = View {
+            now: self.plant.positions(),
+            target: self.control.target(),
+            ready: self.inputs.ready(),
+            not_closed: self.stuck(Drive::Close),
+            not_opened: self.stuck(Drive::Open),
+            may_loop: self.limits.sync.loops() && faultless,
+            in_step: self.synchroscope.is_in_step(&self.limits.sync, &self.limits.supervision),
+            // Elevators are not waited for where something has to open.
+            alive: self.plant.alive().contains(&true) && !wishes.forced_open && !wishes.bars.forbid_present(),
+        };
+        match self.sequence.step(dt, view, &self.limits.transfer) {
+            Some(Failure::Move(switch, drive)) => self.board.latch(Alarm::stuck(switch, drive)),
+            Some(Failure::Sync) => {
+                if let Some(alarm) = self.limits.protection.latched_sync_alarm() {
+                    self.board.latch(alarm);
+                }
+            }
+            None => {}
+        }
+    }
+
+    fn serve_loads(&mut self, dt: Duration) {
+        let burden = self.burden();
+        let (alive, auto) = (self.plant.alive(), self.auto);
+        let limits = &self.limits;
+        let around = [0, 1].map(|side: usize| Around {
+            heard: self.inputs.feeders(side),
+            alive: alive[side],
+            auto,
+            full: self.limits.shedding.full(side, burden),
+            limits: &limits.loads,
+        });
+        for (loads, around) in self.loads.iter_mut().zip(around) {
+            loads.step(dt, around, &mut self.board);
+        }
+        self.shedding.step(dt, burden, &limits.shedding);
+        let scene = shedding::Scene { burden, around, limits: &limits.shedding, board: &self.board };
+        self.shedding.unload(dt, &mut self.loads, scene);
+    }
+
     fn sound(&mut self, dt: Duration) {
-        let tripped: usize = self.loads.iter().map(|loads| loads.tripped().len()).sum();
-        let alarms = tripped + usize::from(self.sequence.has_failed());
-        self.horn = if alarms > self.alarms { HORN } else { self.horn.saturating_sub(dt) };
+        let alarms = self.board.count();
+        self.horn = if alarms > self.alarms { self.limits.horn } else { self.horn.saturating_sub(dt) };
         self.alarms = alarms;
     }
 
     fn count(&mut self, dt: Duration) {
-        let feeding = self.plant.feeding();
-        let alive = self.plant.alive();
-        for (index, supply) in self.source_supply.iter_mut().enumerate() {
-            let feeds = feeding.iter().zip(alive).any(|(from, alive)| *from == Some(index) && alive);
-            *supply += if feeds { dt } else { Duration::ZERO };
+        let (feeds, alive) = (self.plant.feeds(), self.plant.alive());
+        for (source, supply) in self.source_supply.iter_mut().enumerate() {
+            let serves = feeds.iter().zip(alive).any(|(by, alive)| by[source] && alive);
+            *supply += if serves { dt } else { Duration::ZERO };
         }
         for (supply, alive) in self.load_supply.iter_mut().zip(alive) {
             supply.step(dt, alive);
@@ -277,23 +428,17 @@ impl Hat821si {
 
 impl Panel for Hat821si {
     fn step(&mut self, dt: Duration) {
-        let seconds = dt.as_secs_f64();
         self.passed += dt;
         self.play();
-        // The switchgear first: the words then tell of switches that have moved, in the same image.
-        self.plant.switch(seconds, self.sequence.drives());
-        for (loads, alive) in self.loads.iter_mut().zip(self.plant.alive()) {
-            loads.step(dt, alive, self.auto);
-        }
-        let connected = self.loads.each_ref().map(Loads::connected);
-        self.plant.carry(seconds, connected, self.genset.is_running());
-        for (supervision, source) in self.supervision.iter_mut().zip(&self.plant.sources) {
-            supervision.step(dt, &source.feed);
-        }
-        self.choose_target();
-        self.choose_genset();
-        self.genset.step(dt, self.remote_start || self.mains_abnormal);
-        self.sequence.step(dt, self.plant.positions(), self.target);
+        let (outputs, guests) = (self.outputs(), self.guests());
+        self.plant.step(dt.as_secs_f64(), &outputs);
+        self.meters = self.plant.sources.each_ref().map(Source::meter);
+        self.inputs.hear(&self.plant);
+        self.protect(dt, outputs.switches);
+        self.judge(dt, guests);
+        self.ask_for_gensets(dt);
+        self.transfer_on(dt);
+        self.serve_loads(dt);
         self.sound(dt);
         self.count(dt);
     }
@@ -302,7 +447,7 @@ impl Panel for Hat821si {
     fn write(&mut self, _address: u16, _value: u16) {}
 
     fn write_coil(&mut self, coil: u16, on: bool) {
-        if self.local {
+        if self.is_deaf() {
             return;
         }
         match coil {
@@ -329,6 +474,27 @@ impl Panel for Hat821si {
             // Never used: there is no function that writes registers.
             protected: ExceptionCode::ILLEGAL_DATA_ADDRESS,
         }
+    }
+
+    fn configure(&mut self, settings: &Settings) {
+        self.limits = Limits::of(settings);
+        self.board.feeder_faults = settings.is_on("load_switch_fault");
+    }
+
+    fn levers(&self) -> &'static [Lever] {
+        levers::LEVERS
+    }
+
+    fn lever(&self, id: &str) -> Option<Position> {
+        self.position_of(id)
+    }
+
+    fn pull(&mut self, id: &str, to: Position) {
+        self.pull_to(id, to);
+    }
+
+    fn inject(&mut self, point: &str, bit: u16, active: bool) -> bool {
+        render::word_of(point).is_some_and(|word| self.board.inject(word, bit, active))
     }
 }
 

@@ -1,27 +1,31 @@
 //! From the controller to its registers, in the manual's order; the addresses are the manual's.
 
+mod sources;
+
 use busbar_profile::BitSet;
 
 use crate::bank::Bank;
 
 use super::Hat821si;
+use super::alarms::{FAULTS, FAULTS_OF_504, FAULTS_OF_511, WORDS};
 use super::counters::{calendar, parts};
+use super::inputs::{Input, OWN_OPENING};
 use super::loads::Loads;
-use super::plant::{Drive, FEEDERS, RATED_CURRENT, Source, Switch};
+use super::switches::{Drive, FEEDERS, Positions, Switch};
 
-/// Words whose bits are all faults.
-const FAULTS: [u16; 7] = [503, 523, 524, 525, 526, 527, 528];
-/// Bits of word 504 that are faults; its others are warnings.
-const FAULTS_OF_504: [u16; 5] = [9, 12, 13, 14, 15];
-/// Bits of word 511 that are faults; its others are warnings.
-const FAULTS_OF_511: [u16; 4] = [12, 13, 14, 15];
+/// Part of the rated voltage that the supply of the switches' drives needs.
+const SUPPLY: f64 = 0.7;
+
+/// The address of a word by the id of its point.
+pub(super) fn word_of(point: &str) -> Option<u16> {
+    let profile = busbar_profile::builtin("smartgen-hat821si")?;
+    profile.point(point).map(|point| point.address)
+}
 
 /// Stores all of them.
 pub(super) fn registers(unit: &Hat821si, bank: &mut Bank) {
-    let [first, second] = &unit.plant.sources;
-    source(first, &S1, bank);
-    source(second, &S2, bank);
-    between(bank);
+    sources::store(unit, bank);
+    sequence(unit, bank);
     state(unit, bank);
     alarms(unit, bank);
     load_switches(unit, bank);
@@ -31,145 +35,7 @@ pub(super) fn registers(unit: &Hat821si, bank: &mut Bank) {
     common(unit, bank);
 }
 
-/// Where the registers of a source stand.
-struct SourceRegisters {
-    line_voltage: u16,
-    phase_voltage: u16,
-    angle: u16,
-    frequency: u16,
-    unbalance: u16,
-    current: u16,
-    neutral_current: u16,
-    current_angle: u16,
-    neutral_angle: u16,
-    active: u16,
-    total_active: u16,
-    reactive: u16,
-    total_reactive: u16,
-    apparent: u16,
-    total_apparent: u16,
-    power_factor: u16,
-    average_power_factor: u16,
-    zero_sequence: u16,
-    zero_sequence_share: u16,
-    active_energy: u16,
-    reactive_energy: u16,
-}
-
-const S1: SourceRegisters = SourceRegisters {
-    line_voltage: 1000,
-    phase_voltage: 1003,
-    angle: 1006,
-    frequency: 1009,
-    unbalance: 1033,
-    current: 1040,
-    neutral_current: 1043,
-    current_angle: 1044,
-    neutral_angle: 1047,
-    active: 1048,
-    total_active: 1054,
-    reactive: 1056,
-    total_reactive: 1062,
-    apparent: 1064,
-    total_apparent: 1070,
-    power_factor: 1072,
-    average_power_factor: 1075,
-    zero_sequence: 1079,
-    zero_sequence_share: 1080,
-    active_energy: 1125,
-    reactive_energy: 1127,
-};
-
-const S2: SourceRegisters = SourceRegisters {
-    line_voltage: 1020,
-    phase_voltage: 1023,
-    angle: 1026,
-    frequency: 1029,
-    unbalance: 1034,
-    current: 1166,
-    neutral_current: 1169,
-    current_angle: 1170,
-    neutral_angle: 1173,
-    active: 1174,
-    total_active: 1180,
-    reactive: 1182,
-    total_reactive: 1188,
-    apparent: 1190,
-    total_apparent: 1196,
-    power_factor: 1198,
-    average_power_factor: 1201,
-    zero_sequence: 1202,
-    zero_sequence_share: 1203,
-    active_energy: 1129,
-    reactive_energy: 1131,
-};
-
-fn source(source: &Source, at: &SourceRegisters, bank: &mut Bank) {
-    let feed = &source.feed;
-    bank.numbers(at.line_voltage, 1, feed.line_voltage());
-    bank.numbers(at.phase_voltage, 1, feed.voltage);
-    for ((phase, address), degrees) in (0..).zip(at.angle..).zip(source.angles()) {
-        match source.has_phase(phase) {
-            true => bank.number(address, degrees),
-            false => bank.absent(address),
-        }
-    }
-    bank.number(at.frequency, feed.frequency);
-    bank.number(at.unbalance, 1000.0 * unbalance(feed.line_voltage()));
-
-    let (residual, residual_angle) = source.residual();
-    bank.numbers(at.current, 1, feed.current());
-    bank.number(at.neutral_current, residual);
-    bank.numbers(at.current_angle, 1, source.current_angles().map(|degrees| 10.0 * degrees));
-    bank.number(at.neutral_angle, 10.0 * residual_angle);
-    bank.numbers(at.active, 2, feed.active);
-    bank.number(at.total_active, feed.total_active());
-    bank.numbers(at.reactive, 2, feed.reactive);
-    bank.number(at.total_reactive, feed.total_reactive());
-    bank.numbers(at.apparent, 2, feed.apparent());
-    bank.number(at.total_apparent, feed.total_apparent());
-    bank.numbers(at.power_factor, 1, feed.power_factor().map(|factor| 100.0 * factor));
-    bank.number(at.average_power_factor, 100.0 * feed.total_power_factor());
-    bank.number(at.zero_sequence, residual);
-    bank.number(at.zero_sequence_share, 1000.0 * residual / RATED_CURRENT);
-    bank.number(at.active_energy, source.energy.active);
-    bank.number(at.reactive_energy, source.energy.inductive);
-}
-
-/// The largest distance from the mean, as a part of the mean; 0 where there is no voltage.
-fn unbalance(volts: [f64; 3]) -> f64 {
-    let mean = volts.iter().sum::<f64>() / 3.0;
-    let farthest = volts.iter().map(|volts| (volts - mean).abs()).fold(0.0, f64::max);
-    if mean > 1.0 { farthest / mean } else { 0.0 }
-}
-
-/// Differences of what the two meters show, pinned or not; 0 between angles that are not there.
-fn between(bank: &mut Bank) {
-    let difference = |bank: &Bank, first, second| {
-        bank.number_shown(first).zip(bank.number_shown(second)).map(|(first, second)| first - second)
-    };
-    let volts = difference(bank, S1.line_voltage, S2.line_voltage);
-    let hertz = difference(bank, S1.frequency, S2.frequency);
-    let degrees = difference(bank, S1.angle, S2.angle);
-    bank.number(1030, volts.unwrap_or(0.0).clamp(-32_768.0, 32_767.0));
-    bank.number(1031, hertz.unwrap_or(0.0).clamp(-100.0, 100.0));
-    bank.number(1032, degrees.map_or(0.0, |degrees| (degrees + 180.0).rem_euclid(360.0) - 180.0));
-    // Nothing is synchronized: every transfer is open.
-    bank.integer(1083, 0);
-    bank.integer(1107, 0);
-}
-
-fn state(unit: &Hat821si, bank: &mut Bank) {
-    let [first, second] = &unit.supervision;
-    for (address, source) in [(1088, first), (1090, second)] {
-        bank.code(address, source.status());
-        bank.integer(address + 1, source.seconds_left() as i64);
-    }
-    bank.bits(501, first.bits().collect());
-    bank.bits(502, second.bits().collect());
-    bank.code(1092, unit.genset.status());
-    bank.integer(1093, unit.genset.seconds_left() as i64);
-
+fn sequence(unit: &Hat821si, bank: &mut Bank) {
     let positions = unit.plant.positions();
     let steps = unit.loads.each_ref().map(Loads::steps);
     let status = match (unit.sequence.is_still(), steps) {
@@ -180,11 +46,27 @@ fn state(unit: &Hat821si, bank: &mut Bank) {
         _ => unit.sequence.status(positions),
     };
     bank.code(1094, status);
-    bank.integer(1095, unit.sequence.seconds_left() as i64);
-    bank.integer(1084, unit.sequence.seconds_to_alarm() as i64);
+    bank.integer(1095, unit.sequence.seconds_left().into());
+    bank.integer(1083, unit.sequence.seconds_to_sync_failure().into());
+    bank.integer(1084, unit.sequence.seconds_to_alarm().into());
+    bank.integer(1107, unit.limits.sync.loops().into());
+}
 
+fn state(unit: &Hat821si, bank: &mut Bank) {
+    let [first, second] = &unit.supervision;
+    for (address, source) in [(1088, first), (1090, second)] {
+        bank.code(address, source.status());
+        bank.integer(address + 1, source.seconds_left().into());
+    }
+    bank.bits(501, first.bits().collect());
+    bank.bits(502, second.bits().collect());
+    bank.code(1092, unit.genset.status());
+    bank.integer(1093, unit.genset.seconds_left().into());
+
+    let positions = unit.plant.positions();
     let [qs1, qtie, qs2] = unit.sequence.drives();
     let closed = |switch| positions.is_closed(switch);
+    let causes = unit.genset.causes();
     bank.bits(
         507,
         set([
@@ -194,80 +76,142 @@ fn state(unit: &Hat821si, bank: &mut Bank) {
             (3, qs2 == Some(Drive::Open)),
             (4, closed(Switch::Qs1)),
             (5, closed(Switch::Qs2)),
-            (13, unit.remote_start),
-            (14, unit.mains_abnormal),
+            (12, causes.on_load),
+            (13, causes.off_load),
+            (14, causes.mains_abnormal),
+            (15, causes.scheduled),
         ]),
     );
-    bank.bits(508, BitSet::EMPTY);
-    bank.bits(509, set([(6, unit.loads.iter().any(Loads::asks))]));
     bank.bits(
         510,
-        set([(2, qtie == Some(Drive::Close)), (3, qtie == Some(Drive::Open)), (7, closed(Switch::Qtie))]),
+        set([
+            (2, qtie == Some(Drive::Close)),
+            (3, qtie == Some(Drive::Open)),
+            (7, closed(Switch::Qtie)),
+            (10, unit.inputs.has(Input::Qs1QtieInhibit)),
+            (11, unit.inputs.has(Input::Qs2QtieInhibit)),
+        ]),
+    );
+    controls(unit, bank);
+}
+
+fn controls(unit: &Hat821si, bank: &mut Bank) {
+    let waits = |switch| unit.sequence.waits_for() == Some(switch);
+    let has = |input| unit.inputs.has(input);
+    let mut starts = set([
+        (4, unit.genset.is_not_scheduled()),
+        (10, unit.genset.is_inhibited()),
+        (12, has(Input::S1CloseInhibit)),
+        (13, has(Input::S2CloseInhibit)),
+        (14, waits(Switch::Qs1)),
+        (15, waits(Switch::Qs2)),
+    ]);
+    if let Some(choice) = unit.genset.choice_bit() {
+        starts.insert(choice);
+    }
+    bank.bits(508, starts);
+    let shed = unit.shedding.steps();
+    bank.bits(
+        509,
+        set([
+            (0, shed >= 1),
+            (1, shed >= 2),
+            (2, shed >= 3),
+            (5, unit.sequence.holds_elevators()),
+            (6, unit.loads.iter().any(Loads::asks)),
+            (8, has(Input::QtieCloseInhibit)),
+            (10, waits(Switch::Qtie)),
+            (11, has(Input::AutoRestore)),
+            (12, has(Input::RemoteInhibit)),
+            (13, has(Input::S1SupplyQtieInhibit)),
+            (14, has(Input::S2SupplyQtieInhibit)),
+        ]),
     );
 }
 
 fn alarms(unit: &Hat821si, bank: &mut Bank) {
-    let failed = |switch, drive| unit.sequence.failed_to(switch, drive);
-    let of_sources = [
-        (1, failed(Switch::Qs1, Drive::Close)),
-        (2, failed(Switch::Qs1, Drive::Open)),
-        (4, failed(Switch::Qs2, Drive::Close)),
-        (5, failed(Switch::Qs2, Drive::Open)),
-    ];
-    let any = of_sources.iter().any(|(_, failed)| *failed);
-    bank.bits(503, set(of_sources.into_iter().chain([(0, any)])));
-    bank.bits(504, set([(12, failed(Switch::Qtie, Drive::Close)), (13, failed(Switch::Qtie, Drive::Open))]));
-    // Every expansion module answers, and nothing feeds back.
-    bank.bits(511, BitSet::EMPTY);
-    bank.bits(512, set([(6, unit.loads.iter().any(|loads| !loads.tripped().is_empty()))]));
+    for word in WORDS {
+        bank.bits(word, unit.board.word(word));
+    }
 }
 
 fn load_switches(unit: &Hat821si, bank: &mut Bank) {
-    // Nothing is unloaded, and no load switch has failed to move or been drawn out.
-    bank.bits(513, BitSet::EMPTY);
+    let any = |those: fn(&Loads, Option<usize>) -> BitSet, source| {
+        unit.loads.iter().any(|loads| !those(loads, Some(source)).is_empty())
+    };
+    bank.bits(
+        513,
+        set([
+            (0, any(Loads::unloaded, 0)),
+            (1, any(Loads::unloaded, 1)),
+            (2, any(Loads::recovering, 0)),
+            (3, any(Loads::recovering, 1)),
+        ]),
+    );
     for (side, loads) in (0..).zip(&unit.loads) {
-        for word in [523, 525, 537, 539, 541] {
-            bank.bits(word + side, BitSet::EMPTY);
-        }
-        bank.bits(527 + side, loads.tripped());
-        bank.bits(529 + side, loads.driven(true));
-        bank.bits(531 + side, loads.driven(false));
-        bank.bits(533 + side, loads.closed());
-        bank.bits(535 + side, every_feeder());
+        let heard = unit.inputs.feeders(usize::from(side));
+        let those = |which: [bool; FEEDERS]| set((0..).zip(which));
+        bank.bits(529 + side, loads.driven(Drive::Close));
+        bank.bits(531 + side, loads.driven(Drive::Open));
+        bank.bits(533 + side, those(heard.closed));
+        bank.bits(535 + side, those(heard.in_work));
+        bank.bits(537 + side, those(heard.in_work.map(|in_work| !in_work)));
+        bank.bits(539 + side, loads.unloaded(None));
+        bank.bits(541 + side, loads.recovering(None));
         bank.integer(1086 + side, loads.trip_number().into());
         bank.integer(1096 + side, loads.acted().into());
-        bank.integer(1098 + side, 0);
+        bank.integer(1098 + side, loads.failure_number().into());
     }
 }
 
 fn inputs_and_outputs(unit: &Hat821si, bank: &mut Bank) {
-    let positions = unit.plant.positions();
-    let feedback = [Switch::Qs1, Switch::Qs2, Switch::Qtie].map(|switch| positions.is_closed(switch));
-    bank.bits(505, set((0..).zip(feedback).chain([(3, unit.genset.is_running())])));
-    let supplied = unit.plant.sources.iter().any(Source::is_present);
+    bank.bits(505, unit.inputs.own());
+    let volts = |source: usize| unit.meters[source].feed.average_voltage();
+    let supplied = (0..2).any(|source| volts(source) > SUPPLY * unit.limits.supervision.rated());
+    let [first, second] = unit.genset.signals();
     bank.bits(
         506,
         set([
-            (0, unit.genset.start_output()),
+            (0, first || second),
             (1, !unit.horn.is_zero()),
             (2, unit.alarms > 0),
             (3, unit.auto),
+            (4, first),
+            (5, second),
+            (6, unit.sequence.holds_elevators()),
             (12, supplied),
             (13, supplied),
         ]),
     );
-    for (side, loads) in (0..).zip(&unit.loads) {
-        bank.bits(514 + side, loads.closed());
-        bank.bits(516 + side, loads.tripped());
-        bank.bits(518 + side, every_feeder());
-        bank.bits(521 + side, loads.driven(true));
+    for (word, module) in (514..).zip(unit.inputs.modules()) {
+        bank.bits(word, module);
     }
-    bank.bits(520, set((0..).zip(unit.remote_outputs)));
-    bank.bits(543, BitSet::EMPTY);
+    output_modules(unit, bank);
+}
+
+/// The remote outputs on module 1; on 2 and 3 the closing outputs of a side and the opening outputs of its first four
+/// load switches; on 4 the opening outputs of all others. What is silent is off.
+fn output_modules(unit: &Hat821si, bank: &mut Bank) {
+    let [first, _, _, last] = unit.inputs.output_modules_cut;
+    bank.bits(520, set((0..).zip(unit.remote_outputs).filter(|_| !first)));
+    let mut rest = BitSet::EMPTY;
+    for (side, loads) in (0..).zip(&unit.loads) {
+        let cut = unit.inputs.output_modules_cut[1 + usize::from(side)];
+        let mut own = loads.driven(Drive::Close);
+        for bit in loads.driven(Drive::Open).iter() {
+            let (own_opening, feeders) = (OWN_OPENING as u16, FEEDERS as u16);
+            match bit.checked_sub(own_opening) {
+                None => own.insert(feeders + bit),
+                Some(place) => rest.insert(side * (feeders - own_opening) + place),
+            }
+        }
+        bank.bits(521 + side, if cut { BitSet::EMPTY } else { own });
+    }
+    bank.bits(543, if last { BitSet::EMPTY } else { rest });
 }
 
 fn counters(unit: &Hat821si, bank: &mut Bank) {
-    for (address, part) in (1100..).zip(calendar(unit.epoch.plus(unit.passed))) {
+    for (address, part) in (1100..).zip(calendar(unit.now())) {
         bank.integer(address, part);
     }
     let [load_1, load_2] = &unit.load_supply;
@@ -288,7 +232,7 @@ fn counters(unit: &Hat821si, bank: &mut Bank) {
     }
     let [qs1, qtie, qs2] = &unit.plant.switches;
     for (address, switch) in [(1133, qs1), (1135, qs2), (1137, qtie)] {
-        bank.integer(address, switch.closings.into());
+        bank.integer(address, switch.closings().into());
     }
 }
 
@@ -311,14 +255,11 @@ fn common(unit: &Hat821si, bank: &mut Bank) {
             (9, unit.local),
             (10, s1_master),
             (11, s2_master),
+            (12, unit.sequence.loops() || unit.plant.positions() == Positions::ALL_CLOSED),
             (13, !unit.local),
             (15, unit.genset.start_output()),
         ]),
     );
-}
-
-fn every_feeder() -> BitSet {
-    (0..FEEDERS as u16).collect()
 }
 
 fn set(bits: impl IntoIterator<Item = (u16, bool)>) -> BitSet {

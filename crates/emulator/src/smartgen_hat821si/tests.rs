@@ -1,12 +1,24 @@
 //! What no client can bring about: sources that fail at will, switches that jam, the key on the front.
 
-use super::plant::Trouble;
+use super::plant::Mains;
 use super::*;
 
 const TENTH: Duration = Duration::from_millis(100);
 
-fn quiet() -> Hat821si {
-    Hat821si::new(1, false)
+/// What the profile sets.
+pub(super) fn settings() -> Settings {
+    Settings::of(busbar_profile::builtin("smartgen-hat821si").unwrap())
+}
+
+pub(super) fn quiet() -> Hat821si {
+    set(&[])
+}
+
+fn set(settings_of_this: &[(&str, &str)]) -> Hat821si {
+    let (mut unit, mut settings) = (Hat821si::new(1, false), settings());
+    settings_of_this.iter().for_each(|(id, value)| settings.set(id, value).unwrap());
+    unit.configure(&settings);
+    unit
 }
 
 fn pass(unit: &mut Hat821si, seconds: u64) {
@@ -17,37 +29,41 @@ fn digits(unit: &Hat821si) -> [u8; 3] {
     unit.plant.positions().digits()
 }
 
-fn fail(unit: &mut Hat821si, source: usize, trouble: Trouble) {
-    unit.plant.sources[source].trouble = trouble;
+fn fail(unit: &mut Hat821si, source: usize, mains: Mains) {
+    unit.plant.sources[source].mains = mains;
+}
+
+fn wear(unit: &mut Hat821si, switch: Switch, condition: plant::Condition) {
+    unit.plant.switches[switch as usize].set_condition(condition);
 }
 
 #[test]
 fn a_failed_source_is_replaced_over_the_tie_and_gets_its_section_back() {
-    for (source, trouble, replaced) in
-        [(0, Trouble::Blackout, [0, 1, 1]), (1, Trouble::PhaseLost, [1, 1, 0]), (0, Trouble::Sag, [0, 1, 1])]
+    for (source, mains, replaced) in
+        [(0, Mains::Failed, [0, 1, 1]), (1, Mains::Lost(1), [1, 1, 0]), (0, Mains::Sagging, [0, 1, 1])]
     {
         let mut unit = quiet();
-        fail(&mut unit, source, trouble);
+        fail(&mut unit, source, mains);
         pass(&mut unit, 4);
-        assert_eq!(digits(&unit), [1, 0, 1], "{trouble:?}: not yet");
+        assert_eq!(digits(&unit), [1, 0, 1], "{mains:?}: not yet");
         pass(&mut unit, 16);
-        assert_eq!(digits(&unit), replaced, "{trouble:?}");
-        assert_eq!(unit.plant.alive(), [true, true], "{trouble:?}");
-        fail(&mut unit, source, Trouble::Nothing);
+        assert_eq!(digits(&unit), replaced, "{mains:?}");
+        assert_eq!(unit.plant.alive(), [true, true], "{mains:?}");
+        fail(&mut unit, source, Mains::Normal);
         pass(&mut unit, 9);
-        assert_eq!(digits(&unit), replaced, "{trouble:?}: not yet trusted");
+        assert_eq!(digits(&unit), replaced, "{mains:?}: not yet trusted");
         pass(&mut unit, 6);
-        assert_eq!(digits(&unit), [1, 0, 1], "{trouble:?}");
-        assert_eq!(unit.genset.status(), 9, "{trouble:?}");
+        assert_eq!(digits(&unit), [1, 0, 1], "{mains:?}");
+        assert_eq!(unit.genset.status(), 9, "{mains:?}");
     }
 }
 
 #[test]
 fn a_dip_shorter_than_the_delay_transfers_nothing() {
     let mut unit = quiet();
-    fail(&mut unit, 0, Trouble::Sag);
+    fail(&mut unit, 0, Mains::Sagging);
     pass(&mut unit, 4);
-    fail(&mut unit, 0, Trouble::Nothing);
+    fail(&mut unit, 0, Mains::Normal);
     for _ in 0..200 {
         unit.step(TENTH);
         assert_eq!(digits(&unit), [1, 0, 1]);
@@ -57,8 +73,8 @@ fn a_dip_shorter_than_the_delay_transfers_nothing() {
 #[test]
 fn without_any_source_the_genset_feeds_both_sections_until_source_1_is_back() {
     let mut unit = quiet();
-    fail(&mut unit, 0, Trouble::Blackout);
-    fail(&mut unit, 1, Trouble::Blackout);
+    fail(&mut unit, 0, Mains::Failed);
+    fail(&mut unit, 1, Mains::Failed);
     pass(&mut unit, 6);
     assert_eq!((unit.genset.status(), digits(&unit)), (0, [1, 0, 1]));
     pass(&mut unit, 30);
@@ -67,7 +83,7 @@ fn without_any_source_the_genset_feeds_both_sections_until_source_1_is_back() {
     unit.write_coil(GENSET_STOP, true);
     pass(&mut unit, 10);
     assert_eq!(unit.genset.status(), 8, "the automatic start goes on");
-    fail(&mut unit, 0, Trouble::Nothing);
+    fail(&mut unit, 0, Mains::Normal);
     pass(&mut unit, 30);
     assert_eq!((unit.genset.status(), unit.plant.alive()), (9, [true, true]));
     assert_eq!(digits(&unit), [1, 1, 0]);
@@ -77,7 +93,7 @@ fn without_any_source_the_genset_feeds_both_sections_until_source_1_is_back() {
 fn in_manual_mode_nothing_is_transferred_by_itself() {
     let mut unit = quiet();
     unit.write_coil(AUTO, false);
-    fail(&mut unit, 0, Trouble::Blackout);
+    fail(&mut unit, 0, Mains::Failed);
     pass(&mut unit, 30);
     assert_eq!((digits(&unit), unit.plant.alive()), ([1, 0, 1], [false, true]));
     unit.write_coil(TRANSFER_110, true);
@@ -87,7 +103,7 @@ fn in_manual_mode_nothing_is_transferred_by_itself() {
     pass(&mut unit, 10);
     assert_eq!((digits(&unit), unit.plant.alive()), ([0, 1, 1], [true, true]));
     unit.write_coil(AUTO, true);
-    fail(&mut unit, 0, Trouble::Nothing);
+    fail(&mut unit, 0, Mains::Normal);
     pass(&mut unit, 20);
     assert_eq!(digits(&unit), [1, 0, 1]);
 }
@@ -98,26 +114,48 @@ fn a_remote_transfer_in_automatic_mode_ends_when_a_source_fails() {
     unit.write_coil(TRANSFER_110, true);
     pass(&mut unit, 30);
     assert_eq!(digits(&unit), [1, 1, 0]);
-    fail(&mut unit, 0, Trouble::Blackout);
+    fail(&mut unit, 0, Mains::Failed);
     pass(&mut unit, 20);
     assert_eq!(digits(&unit), [0, 1, 1]);
 }
 
 #[test]
-fn a_switch_that_jams_is_an_alarm_and_holds_off_transfers() {
+fn a_tie_that_does_not_close_is_an_alarm_and_leaves_the_rest_to_be_used() {
     let mut unit = quiet();
-    unit.plant.switches[Switch::Qtie as usize].jammed = true;
-    fail(&mut unit, 0, Trouble::Blackout);
+    wear(&mut unit, Switch::Qtie, plant::Condition::WillNotClose);
+    fail(&mut unit, 0, Mains::Failed);
     pass(&mut unit, 20);
-    assert!(unit.sequence.failed_to(Switch::Qtie, plant::Drive::Close));
+    assert!(unit.board.has(Alarm::stuck(Switch::Qtie, Drive::Close)));
     assert!(unit.alarms == 1 && !unit.horn.is_zero());
-    unit.write_coil(TRANSFER_000, true);
+    unit.write_coil(TRANSFER_110, true);
     pass(&mut unit, 10);
     assert_eq!(digits(&unit), [0, 0, 1]);
+    fail(&mut unit, 0, Mains::Normal);
+    pass(&mut unit, 20);
+    assert_eq!(digits(&unit), [1, 0, 1], "QS1 has nothing wrong with it");
+    assert_eq!(unit.alarms, 1, "the alarm stays");
 
-    unit.plant.switches[Switch::Qtie as usize].jammed = false;
+    fail(&mut unit, 0, Mains::Failed);
+    pass(&mut unit, 10);
+    wear(&mut unit, Switch::Qtie, plant::Condition::Normal);
     unit.write_coil(ALARM_RESET, true);
     assert!(unit.horn.is_zero());
+    pass(&mut unit, 5);
+    assert_eq!((digits(&unit), unit.alarms), ([0, 1, 1], 0));
+}
+
+#[test]
+fn a_switch_that_does_not_open_holds_off_transfers() {
+    let mut unit = quiet();
+    wear(&mut unit, Switch::Qs1, plant::Condition::WillNotOpen);
+    fail(&mut unit, 0, Mains::Failed);
+    pass(&mut unit, 20);
+    assert!(unit.board.has(Alarm::stuck(Switch::Qs1, Drive::Open)));
+    wear(&mut unit, Switch::Qs1, plant::Condition::Normal);
+    unit.write_coil(TRANSFER_000, true);
+    pass(&mut unit, 10);
+    assert_eq!((digits(&unit), unit.alarms), ([1, 0, 1], 1));
+    unit.write_coil(ALARM_RESET, true);
     pass(&mut unit, 5);
     assert_eq!((digits(&unit), unit.alarms), ([0, 1, 1], 0));
 }
@@ -126,13 +164,14 @@ fn a_switch_that_jams_is_an_alarm_and_holds_off_transfers() {
 fn what_could_not_be_done_by_hand_is_not_tried_again_by_itself() {
     let mut unit = quiet();
     unit.write_coil(AUTO, false);
-    unit.plant.switches[Switch::Qs1 as usize].jammed = true;
+    wear(&mut unit, Switch::Qtie, plant::Condition::WillNotClose);
     unit.write_coil(TRANSFER_011, true);
-    pass(&mut unit, 10);
-    unit.plant.switches[Switch::Qs1 as usize].jammed = false;
+    pass(&mut unit, 12);
+    assert_eq!(digits(&unit), [0, 0, 1]);
+    wear(&mut unit, Switch::Qtie, plant::Condition::Normal);
     unit.write_coil(ALARM_RESET, true);
     pass(&mut unit, 10);
-    assert_eq!(digits(&unit), [1, 0, 1]);
+    assert_eq!(digits(&unit), [0, 0, 1]);
 }
 
 #[test]

@@ -1,102 +1,375 @@
 //! How the three switches get from where they are to where they shall be: register 1094 with delay 1095.
 //!
-//! Always an open transition: first everything opens that shall not stay closed, then a rest, then the switches
-//! close one after the other, those of the sources before the tie. So two sources never meet.
+//! An open transition opens first what shall not stay closed, rests, and closes one switch after the other, those of the
+//! sources before the tie: so two sources never meet. A loop closing, between two sources that are both good, closes
+//! first, the last switch synchronized, and opens what is then too much.
 
 use std::time::Duration;
 
-use super::plant::{Drive, Positions, Switch};
+use crate::settings::Settings;
 
-/// Seconds with the load on neither source, for motors and transformers to lose their field.
-const REST: Duration = Duration::from_secs(2);
-/// Seconds that a switch may take before it has failed.
-const SUPERVISION: Duration = Duration::from_secs(5);
+use super::diagram::Edge;
+use super::switches::{Drive, Positions, Switch};
+use super::timer::Countdown;
 
 const ORDER: [Switch; 3] = [Switch::Qs1, Switch::Qs2, Switch::Qtie];
 
+/// Delays as they are set.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Limits {
+    closing: Duration,
+    opening: Duration,
+    rest: Duration,
+    elevator: Duration,
+    /// How long a switch is waited for that does not say that it is ready; none: nobody asks.
+    ready: Option<Duration>,
+    sync: Duration,
+    /// Sources that do not come together are changed over with a gap.
+    sync_fallback: bool,
+    parallel: Duration,
+}
+
+impl Limits {
+    pub(super) fn of(settings: &Settings) -> Self {
+        Self {
+            closing: settings.seconds("closing_time"),
+            opening: settings.seconds("opening_time"),
+            rest: settings.seconds("transfer_rest"),
+            elevator: settings.seconds("elevator_delay"),
+            ready: settings.is_on("position_feedback").then(|| settings.seconds("position_feedback_time")),
+            sync: settings.seconds("sync_time"),
+            sync_fallback: settings.is_on("sync_fallback"),
+            parallel: settings.seconds("loop_time"),
+        }
+    }
+}
+
+/// What is being done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Activity {
     Still,
+    Ready,
+    Elevator,
     Opening(Switch),
     Rest,
+    WaitPosition(Switch),
     Closing(Switch),
+    WaitSync(Switch),
+    SyncClosing(Switch),
+    Parallel,
+}
+
+/// The same without the switch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stage {
+    Still,
+    Ready,
+    Elevator,
+    Opening,
+    Rest,
+    WaitPosition,
+    Closing,
+    WaitSync,
+    SyncClosing,
+    Parallel,
+}
+
+impl Stage {
+    /// Every way from one to another, with what leads there.
+    pub(super) const WAYS: &[Edge<Self>] = &[
+        Edge::new(Self::Still, Self::Ready, "another position is wanted"),
+        Edge::new(Self::Ready, Self::Still, "no longer wanted"),
+        Edge::new(Self::Ready, Self::Elevator, "a living section will be interrupted"),
+        Edge::new(Self::Ready, Self::Opening, "a switch has to open"),
+        Edge::new(Self::Ready, Self::WaitPosition, "a switch has to close and is not ready"),
+        Edge::new(Self::Ready, Self::Closing, "a switch has to close"),
+        Edge::new(Self::Ready, Self::WaitSync, "the next switch joins both sources"),
+        Edge::new(Self::Elevator, Self::Opening, "elevator delay over"),
+        Edge::new(Self::Elevator, Self::Ready, "another way is wanted"),
+        Edge::new(Self::Opening, Self::Opening, "open, and the next one has to"),
+        Edge::new(Self::Opening, Self::Rest, "open, and one has to close"),
+        Edge::new(Self::Opening, Self::Still, "all done, or not open in time"),
+        Edge::new(Self::Rest, Self::Closing, "rest over"),
+        Edge::new(Self::Rest, Self::WaitPosition, "rest over, switch not ready"),
+        Edge::new(Self::Rest, Self::Ready, "rest over, another way is wanted"),
+        Edge::new(Self::Rest, Self::Still, "rest over, nothing left to do"),
+        Edge::new(Self::WaitPosition, Self::Closing, "ready"),
+        Edge::new(Self::WaitPosition, Self::WaitSync, "ready, and it joins both sources"),
+        Edge::new(Self::WaitPosition, Self::Ready, "another way is wanted"),
+        Edge::new(Self::WaitPosition, Self::Still, "not ready in time"),
+        Edge::new(Self::Closing, Self::Closing, "closed, and the next one has to"),
+        Edge::new(Self::Closing, Self::WaitPosition, "closed, and the next one is not ready"),
+        Edge::new(Self::Closing, Self::WaitSync, "closed, and the next one joins both sources"),
+        Edge::new(Self::Closing, Self::Ready, "another way is wanted"),
+        Edge::new(Self::Closing, Self::Still, "all done, or not closed in time"),
+        Edge::new(Self::WaitSync, Self::SyncClosing, "in step"),
+        Edge::new(
+            Self::WaitSync,
+            Self::Ready,
+            "another way is wanted, or not in step in time with the fallback set",
+        ),
+        Edge::new(Self::SyncClosing, Self::Parallel, "closed"),
+        Edge::new(Self::SyncClosing, Self::Ready, "another way is wanted"),
+        Edge::new(Self::SyncClosing, Self::Still, "not closed in time"),
+        Edge::new(Self::Parallel, Self::Opening, "loop time over"),
+        Edge::new(Self::Parallel, Self::Still, "somebody else has opened one"),
+    ];
+}
+
+impl Activity {
+    fn stage(self) -> Stage {
+        match self {
+            Self::Still => Stage::Still,
+            Self::Ready => Stage::Ready,
+            Self::Elevator => Stage::Elevator,
+            Self::Opening(_) => Stage::Opening,
+            Self::Rest => Stage::Rest,
+            Self::WaitPosition(_) => Stage::WaitPosition,
+            Self::Closing(_) => Stage::Closing,
+            Self::WaitSync(_) => Stage::WaitSync,
+            Self::SyncClosing(_) => Stage::SyncClosing,
+            Self::Parallel => Stage::Parallel,
+        }
+    }
+}
+
+/// What the sequence acts upon.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    pub(super) now: Positions,
+    pub(super) target: Positions,
+    /// Which switches say that they are ready to be closed.
+    pub(super) ready: Positions,
+    /// Which have an alarm because they did not close, or did not open.
+    pub(super) not_closed: Positions,
+    pub(super) not_opened: Positions,
+    /// Both sources may be joined for a moment.
+    pub(super) may_loop: bool,
+    /// They fit each other now.
+    pub(super) in_step: bool,
+    /// A section has voltage.
+    pub(super) alive: bool,
+}
+
+/// What went wrong in a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Failure {
+    Move(Switch, Drive),
+    Sync,
 }
 
 /// The state machine; time, positions and the target are handed in.
 #[derive(Clone, Debug)]
 pub(super) struct Sequence {
     activity: Activity,
-    timer: Duration,
-    /// Switches that did not move in time, each latched until [`Sequence::acknowledge`].
-    not_closed: Vec<Switch>,
-    not_opened: Vec<Switch>,
+    timer: Countdown,
+    /// The elevators are to stand until all is done.
+    elevator: bool,
+    /// The switch that closed last.
+    closed_last: Option<Switch>,
+    /// This transfer goes on with a gap, for the sources did not come together.
+    gives_up_loop: bool,
+    /// It has been said that they do not.
+    sync_failed: bool,
+    #[cfg(test)]
+    pub(super) walked: std::collections::BTreeSet<(u8, u8)>,
 }
 
 impl Sequence {
     pub(super) fn new() -> Self {
         Self {
             activity: Activity::Still,
-            timer: Duration::ZERO,
-            not_closed: Vec::new(),
-            not_opened: Vec::new(),
+            timer: Countdown::default(),
+            elevator: false,
+            closed_last: None,
+            gives_up_loop: false,
+            sync_failed: false,
+            #[cfg(test)]
+            walked: std::collections::BTreeSet::new(),
         }
     }
 
-    pub(super) fn step(&mut self, dt: Duration, now: Positions, target: Positions) {
-        self.timer = self.timer.saturating_sub(dt);
-        let elapsed = self.timer.is_zero();
+    pub(super) fn step(&mut self, dt: Duration, view: View, limits: &Limits) -> Option<Failure> {
+        self.timer.step(dt);
+        let next = self.next(view, limits);
         match self.activity {
-            Activity::Still => self.enter(self.next(now, target)),
-            Activity::Rest if elapsed => self.enter(self.next(now, target)),
-            Activity::Rest => {}
-            Activity::Opening(switch) if !now.is_closed(switch) => {
-                let next = self.next(now, target);
-                self.enter(if matches!(next, Activity::Closing(_)) { Activity::Rest } else { next });
+            Activity::Still if next != Activity::Still => self.enter(Activity::Ready, limits),
+            Activity::Still => {}
+            Activity::Ready => self.begin(next, view, limits),
+            Activity::Elevator if !matches!(next, Activity::Opening(_)) => {
+                self.enter(Activity::Ready, limits);
             }
-            Activity::Closing(switch) if now.is_closed(switch) => self.enter(self.next(now, target)),
-            Activity::Opening(switch) if elapsed => {
-                self.not_opened.push(switch);
-                self.enter(Activity::Still);
-            }
-            Activity::Closing(switch) if elapsed => {
-                self.not_closed.push(switch);
-                self.enter(Activity::Still);
-            }
-            Activity::Opening(_) | Activity::Closing(_) => {}
+            Activity::Elevator if self.timer.is_over() => self.enter(next, limits),
+            Activity::Rest if self.timer.is_over() => self.go_on(next, limits),
+            Activity::Elevator | Activity::Rest => {}
+            Activity::Opening(switch) => return self.open(switch, next, view, limits),
+            Activity::WaitPosition(switch) => return self.wait_position(switch, next, limits),
+            Activity::Closing(switch) => return self.close(switch, next, view, limits),
+            Activity::WaitSync(switch) => return self.wait_sync(switch, next, view, limits),
+            Activity::SyncClosing(switch) => return self.sync_close(switch, view, limits),
+            Activity::Parallel => self.part(next, view, limits),
         }
+        None
     }
 
-    fn next(&self, now: Positions, target: Positions) -> Activity {
-        if self.has_failed() {
-            return Activity::Still;
-        }
-        let differs = |switch: &Switch| now.is_closed(*switch) != target.is_closed(*switch);
-        let mut different = ORDER.into_iter().filter(differs);
-        let opens = different.clone().find(|switch| now.is_closed(*switch));
-        match (opens, different.next()) {
-            (Some(switch), _) => Activity::Opening(switch),
-            (None, Some(switch)) => Activity::Closing(switch),
-            (None, None) => Activity::Still,
-        }
-    }
-
-    fn enter(&mut self, next: Activity) {
-        if next == self.activity {
-            return;
-        }
-        self.activity = next;
-        self.timer = match next {
-            Activity::Still => Duration::ZERO,
-            Activity::Rest => REST,
-            Activity::Opening(_) | Activity::Closing(_) => SUPERVISION,
+    /// What is to be done next, were nothing under way.
+    fn next(&self, view: View, limits: &Limits) -> Activity {
+        let View { now, target, .. } = view;
+        let opens = |switch: &Switch| now.is_closed(*switch) && !target.is_closed(*switch);
+        let closes = |switch: &Switch| {
+            !now.is_closed(*switch) && target.is_closed(*switch) && !view.not_closed.is_closed(*switch)
         };
+        if view.not_opened != Positions::OPEN {
+            // One does not open: nothing moves but what parts the sources again.
+            let last = self.closed_last.filter(|last| !view.not_opened.is_closed(*last));
+            return match (now == Positions::ALL_CLOSED, last) {
+                (true, Some(last)) => Activity::Opening(last),
+                _ => Activity::Still,
+            };
+        }
+        let open = ORDER.into_iter().find(opens);
+        let close = ORDER.into_iter().find(closes);
+        let union = Positions::by(|switch| now.is_closed(switch) || target.is_closed(switch));
+        let loops = view.may_loop && !self.gives_up_loop && union == Positions::ALL_CLOSED;
+        match (open, close) {
+            (None, None) => Activity::Still,
+            (Some(open), None) => Activity::Opening(open),
+            (Some(open), Some(_)) if !loops => Activity::Opening(open),
+            (_, Some(close)) => {
+                let joins = Positions::by(|switch| now.is_closed(switch) || switch == close);
+                if limits.ready.is_some() && !view.ready.is_closed(close) {
+                    Activity::WaitPosition(close)
+                } else if joins == Positions::ALL_CLOSED {
+                    Activity::WaitSync(close)
+                } else {
+                    Activity::Closing(close)
+                }
+            }
+        }
+    }
+
+    fn begin(&mut self, next: Activity, view: View, limits: &Limits) {
+        let interrupts = matches!(next, Activity::Opening(_)) && view.alive && !self.elevator;
+        if interrupts && !limits.elevator.is_zero() {
+            self.elevator = true;
+            self.enter(Activity::Elevator, limits);
+        } else {
+            self.enter(next, limits);
+        }
+    }
+
+    /// What follows a rest or a closing.
+    fn go_on(&mut self, next: Activity, limits: &Limits) {
+        let turns = matches!(next, Activity::Opening(_))
+            || self.activity == Activity::Rest && matches!(next, Activity::WaitSync(_));
+        self.enter(if turns { Activity::Ready } else { next }, limits);
+    }
+
+    fn open(&mut self, switch: Switch, next: Activity, view: View, limits: &Limits) -> Option<Failure> {
+        if !view.now.is_closed(switch) {
+            let rests = !matches!(next, Activity::Opening(_) | Activity::Still);
+            self.enter(if rests { Activity::Rest } else { next }, limits);
+        } else if self.timer.is_over() {
+            self.enter(Activity::Still, limits);
+            return Some(Failure::Move(switch, Drive::Open));
+        }
+        None
+    }
+
+    fn wait_position(&mut self, switch: Switch, next: Activity, limits: &Limits) -> Option<Failure> {
+        if next == Activity::WaitPosition(switch) {
+            if self.timer.is_over() {
+                self.enter(Activity::Still, limits);
+                return Some(Failure::Move(switch, Drive::Close));
+            }
+        } else if next == Activity::Closing(switch) || next == Activity::WaitSync(switch) {
+            self.enter(next, limits);
+        } else {
+            self.enter(Activity::Ready, limits);
+        }
+        None
+    }
+
+    fn close(&mut self, switch: Switch, next: Activity, view: View, limits: &Limits) -> Option<Failure> {
+        if view.now.is_closed(switch) {
+            self.closed_last = Some(switch);
+            self.go_on(next, limits);
+        } else if !view.target.is_closed(switch) {
+            self.enter(Activity::Ready, limits);
+        } else if self.timer.is_over() {
+            self.enter(Activity::Still, limits);
+            return Some(Failure::Move(switch, Drive::Close));
+        }
+        None
+    }
+
+    fn wait_sync(&mut self, switch: Switch, next: Activity, view: View, limits: &Limits) -> Option<Failure> {
+        if next != Activity::WaitSync(switch) {
+            self.enter(Activity::Ready, limits);
+        } else if view.in_step {
+            self.enter(Activity::SyncClosing(switch), limits);
+        } else if self.timer.is_over() && limits.sync_fallback {
+            self.gives_up_loop = true;
+            self.enter(Activity::Ready, limits);
+        } else if self.timer.is_over() && !self.sync_failed {
+            self.sync_failed = true;
+            return Some(Failure::Sync);
+        }
+        None
+    }
+
+    fn sync_close(&mut self, switch: Switch, view: View, limits: &Limits) -> Option<Failure> {
+        if view.now.is_closed(switch) {
+            self.closed_last = Some(switch);
+            self.enter(Activity::Parallel, limits);
+        } else if !view.target.is_closed(switch) {
+            self.enter(Activity::Ready, limits);
+        } else if self.timer.is_over() {
+            self.enter(Activity::Still, limits);
+            return Some(Failure::Move(switch, Drive::Close));
+        }
+        None
+    }
+
+    fn part(&mut self, next: Activity, view: View, limits: &Limits) {
+        if view.now != Positions::ALL_CLOSED {
+            self.enter(Activity::Still, limits);
+        } else if self.timer.is_over() || !view.may_loop {
+            self.enter(next, limits);
+        }
+    }
+
+    fn enter(&mut self, next: Activity, limits: &Limits) {
+        let (from, to) = (self.activity.stage(), next.stage());
+        debug_assert!(Edge::cause(Stage::WAYS, from, to).is_some(), "{from:?} to {to:?}");
+        #[cfg(test)]
+        self.walked.insert((from as u8, to as u8));
+        self.activity = next;
+        self.timer = Countdown::of(match next {
+            Activity::Still | Activity::Ready => Duration::ZERO,
+            Activity::Elevator => limits.elevator,
+            Activity::Rest => limits.rest,
+            Activity::Opening(_) => limits.opening,
+            Activity::WaitPosition(_) => limits.ready.unwrap_or_default(),
+            Activity::Closing(_) | Activity::SyncClosing(_) => limits.closing,
+            Activity::WaitSync(_) => limits.sync,
+            Activity::Parallel => limits.parallel,
+        });
+        if next == Activity::Still {
+            (self.elevator, self.gives_up_loop) = (false, false);
+        }
+        if !matches!(next, Activity::WaitSync(_)) {
+            self.sync_failed = false;
+        }
     }
 
     /// What the control outputs drive: QS1, QTIE and QS2.
     pub(super) fn drives(&self) -> [Option<Drive>; 3] {
         Switch::ALL.map(|switch| match self.activity {
             Activity::Opening(moving) if moving == switch => Some(Drive::Open),
-            Activity::Closing(moving) if moving == switch => Some(Drive::Close),
+            Activity::Closing(moving) | Activity::SyncClosing(moving) if moving == switch => {
+                Some(Drive::Close)
+            }
             _ => None,
         })
     }
@@ -106,33 +379,46 @@ impl Sequence {
         self.activity == Activity::Still
     }
 
-    /// A switch has not moved: nothing is transferred until somebody acknowledges it.
-    pub(super) fn has_failed(&self) -> bool {
-        !(self.not_closed.is_empty() && self.not_opened.is_empty())
-    }
-
-    pub(super) fn failed_to(&self, switch: Switch, drive: Drive) -> bool {
-        match drive {
-            Drive::Close => self.not_closed.contains(&switch),
-            Drive::Open => self.not_opened.contains(&switch),
+    /// The switch whose feedback is waited for.
+    pub(super) fn waits_for(&self) -> Option<Switch> {
+        match self.activity {
+            Activity::WaitPosition(switch) => Some(switch),
+            _ => None,
         }
     }
 
-    pub(super) fn acknowledge(&mut self) {
-        self.not_closed.clear();
-        self.not_opened.clear();
+    /// The sources are brought together, or are together.
+    pub(super) fn loops(&self) -> bool {
+        matches!(self.activity, Activity::WaitSync(_) | Activity::SyncClosing(_) | Activity::Parallel)
+    }
+
+    /// Bit 509.5.
+    pub(super) fn holds_elevators(&self) -> bool {
+        self.elevator
+    }
+
+    /// It has waited for the sources to come together for too long, and still does.
+    pub(super) fn sync_fails(&self) -> bool {
+        self.sync_failed
     }
 
     /// Register 1094: what is being done, otherwise what is closed.
     pub(super) fn status(&self, now: Positions) -> u16 {
+        let by_switch = |switch, [qs1, qtie, qs2]: [u16; 3]| match switch {
+            Switch::Qs1 => qs1,
+            Switch::Qtie => qtie,
+            Switch::Qs2 => qs2,
+        };
         match self.activity {
-            Activity::Closing(Switch::Qs1) => 1,
-            Activity::Opening(Switch::Qs1) => 2,
-            Activity::Closing(Switch::Qs2) => 3,
-            Activity::Opening(Switch::Qs2) => 4,
+            Activity::Ready => 0,
+            Activity::Closing(switch) => by_switch(switch, [1, 20, 3]),
+            Activity::Opening(switch) => by_switch(switch, [2, 21, 4]),
             Activity::Rest => 5,
-            Activity::Closing(Switch::Qtie) => 20,
-            Activity::Opening(Switch::Qtie) => 21,
+            Activity::WaitSync(_) => 10,
+            Activity::SyncClosing(switch) => by_switch(switch, [11, 9, 12]),
+            Activity::WaitPosition(switch) => by_switch(switch, [13, 19, 14]),
+            Activity::Elevator => 15,
+            Activity::Parallel => 30,
             Activity::Still => match now.digits() {
                 [1, 0, 0] => 16,
                 [0, 0, 1] => 17,
@@ -140,126 +426,36 @@ impl Sequence {
                 [0, 1, 1] => 23,
                 [1, 0, 1] => 24,
                 [0, 1, 0] => 25,
+                [1, 1, 1] => 30,
                 _ => 18,
             },
         }
     }
 
     /// Register 1095.
-    pub(super) fn seconds_left(&self) -> u64 {
-        self.timer.as_millis().div_ceil(1000) as u64
+    pub(super) fn seconds_left(&self) -> u16 {
+        self.timer.seconds()
     }
 
     /// Register 1084: until the switch that is moving has failed.
-    pub(super) fn seconds_to_alarm(&self) -> u64 {
+    pub(super) fn seconds_to_alarm(&self) -> u16 {
         match self.activity {
-            Activity::Opening(_) | Activity::Closing(_) => self.seconds_left(),
-            Activity::Rest | Activity::Still => 0,
+            Activity::Opening(_)
+            | Activity::Closing(_)
+            | Activity::SyncClosing(_)
+            | Activity::WaitPosition(_) => self.seconds_left(),
+            _ => 0,
+        }
+    }
+
+    /// Register 1083: until it is said that the sources do not come together.
+    pub(super) fn seconds_to_sync_failure(&self) -> u16 {
+        match self.activity {
+            Activity::WaitSync(_) => self.seconds_left(),
+            _ => 0,
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::random::Random;
-
-    const TENTH: Duration = Duration::from_millis(100);
-
-    /// Switches that move at once; the statuses on the way.
-    fn walk(from: Positions, to: Positions) -> (Positions, Vec<u16>) {
-        let mut sequence = Sequence::new();
-        let mut closed = from.digits().map(|digit| digit == 1);
-        let mut statuses = Vec::new();
-        for _ in 0..100 {
-            for (closed, drive) in closed.iter_mut().zip(sequence.drives()) {
-                *closed = drive.map_or(*closed, |drive| drive == Drive::Close);
-            }
-            let [qs1, qtie, qs2] = closed.map(u8::from);
-            let now = Positions::of(qs1, qtie, qs2);
-            sequence.step(TENTH, now, to);
-            statuses.push(sequence.status(now));
-            statuses.dedup();
-        }
-        let [qs1, qtie, qs2] = closed.map(u8::from);
-        (Positions::of(qs1, qtie, qs2), statuses)
-    }
-
-    #[test]
-    fn each_transfer_opens_rests_and_closes() {
-        let at = Positions::of;
-        for (from, to, statuses) in [
-            (at(1, 0, 1), at(0, 1, 1), vec![2, 5, 20, 23]),
-            (at(0, 1, 1), at(1, 0, 1), vec![21, 5, 1, 24]),
-            (at(1, 0, 1), at(1, 1, 0), vec![4, 5, 20, 22]),
-            (at(1, 1, 0), at(0, 1, 1), vec![2, 5, 3, 23]),
-            (at(1, 0, 1), at(0, 0, 0), vec![2, 4, 18]),
-            (at(0, 0, 0), at(0, 1, 1), vec![3, 20, 23]),
-            (at(1, 0, 0), at(1, 0, 0), vec![16]),
-            (at(0, 1, 0), at(0, 0, 1), vec![21, 5, 3, 17]),
-        ] {
-            assert_eq!(walk(from, to), (to, statuses), "{from:?} to {to:?}");
-        }
-    }
-
-    #[test]
-    fn the_delay_counts_down() {
-        let mut sequence = Sequence::new();
-        let (from, to) = (Positions::of(1, 0, 1), Positions::of(0, 1, 1));
-        sequence.step(TENTH, from, to);
-        assert_eq!((sequence.seconds_left(), sequence.seconds_to_alarm()), (5, 5));
-        sequence.step(TENTH, Positions::of(0, 0, 1), to);
-        assert_eq!((sequence.seconds_left(), sequence.seconds_to_alarm()), (2, 0));
-        for _ in 0..11 {
-            sequence.step(TENTH, Positions::of(0, 0, 1), to);
-        }
-        assert_eq!(sequence.seconds_left(), 1);
-    }
-
-    #[test]
-    fn a_switch_that_does_not_move_ends_the_transfer_until_it_is_acknowledged() {
-        let (from, to) = (Positions::of(1, 0, 1), Positions::of(0, 1, 1));
-        let mut sequence = Sequence::new();
-        for _ in 0..51 {
-            sequence.step(TENTH, from, to);
-        }
-        assert!(
-            sequence.failed_to(Switch::Qs1, Drive::Open) && !sequence.failed_to(Switch::Qs1, Drive::Close)
-        );
-        assert_eq!((sequence.drives(), sequence.status(from)), ([None; 3], 24));
-        sequence.acknowledge();
-        sequence.step(TENTH, from, to);
-        assert_eq!(sequence.drives(), [Some(Drive::Open), None, None]);
-
-        let mut sequence = Sequence::new();
-        let now = Positions::of(0, 0, 1);
-        for _ in 0..51 {
-            sequence.step(TENTH, now, to);
-        }
-        assert!(sequence.failed_to(Switch::Qtie, Drive::Close) && sequence.has_failed());
-    }
-
-    #[test]
-    fn whatever_is_asked_for_and_when_the_sources_never_meet() {
-        let mut random = Random::new(5);
-        let targets = [[0, 0, 0], [1, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 0], [0, 0, 1]];
-        let mut sequence = Sequence::new();
-        let (mut closed, mut target) = ([true, false, true], Positions::of(1, 0, 1));
-        for _ in 0..20_000 {
-            let [qs1, qtie, qs2] = closed.map(u8::from);
-            sequence.step(TENTH, Positions::of(qs1, qtie, qs2), target);
-            for (closed, drive) in closed.iter_mut().zip(sequence.drives()) {
-                // A switch that sometimes takes a step longer.
-                if let Some(drive) = drive.filter(|_| random.between(0.0, 1.0) < 0.6) {
-                    *closed = drive == Drive::Close;
-                }
-            }
-            assert_ne!(closed, [true; 3]);
-            sequence.acknowledge();
-            if random.between(0.0, 1.0) < 0.1 {
-                let [qs1, qtie, qs2] = targets[random.between(0.0, 6.0) as usize];
-                target = Positions::of(qs1, qtie, qs2);
-            }
-        }
-    }
-}
+mod tests;

@@ -2,6 +2,7 @@
 
 mod alarms;
 mod life;
+mod plant;
 mod settings;
 
 use std::time::Duration;

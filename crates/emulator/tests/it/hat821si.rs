@@ -1,7 +1,11 @@
 //! The HAT821SI from outside: what it shows, what it obeys, and what its manual lets through.
 
+mod alarms;
 mod commands;
+mod gensets;
 mod identities;
+mod loads;
+mod transfers;
 mod values;
 mod wire;
 
@@ -46,4 +50,39 @@ fn bit(site: &Site, point: &str, bit: u16) -> bool {
 /// QS1, QTIE and QS2.
 fn positions(site: &Site) -> [u8; 3] {
     [bit(site, "switches", 4), bit(site, "tie_switch", 7), bit(site, "switches", 5)].map(u8::from)
+}
+
+/// Pulls a lever.
+fn pull(site: &mut Site, lever: &str, to: &str) {
+    site.device.pull(lever, to).unwrap();
+}
+
+/// A site where these are set.
+fn with(settings: &[(&str, &str)]) -> Site {
+    let mut site = quiet();
+    settings.iter().for_each(|(id, value)| site.device.set(id, value).unwrap());
+    site
+}
+
+/// Whether the alarm of that name is active.
+fn has(site: &Site, alarm: &str) -> bool {
+    let mut alarms = site.device.alarms();
+    let alarm = alarms.find(|known| known.id == alarm).unwrap_or_else(|| panic!("no alarm {alarm}"));
+    bit(site, alarm.point, alarm.bit)
+}
+
+/// The alarms that are active, by name.
+fn active(site: &Site) -> Vec<&'static str> {
+    site.device.alarms().filter(|alarm| bit(site, alarm.point, alarm.bit)).map(|alarm| alarm.id).collect()
+}
+
+/// Lets time pass until this is so; how many tenths that took.
+fn until(site: &mut Site, tenths: u32, what: &str, is_so: impl Fn(&Site) -> bool) -> u32 {
+    for passed in 0..tenths {
+        if is_so(site) {
+            return passed;
+        }
+        site.pass(crate::site::TENTH);
+    }
+    panic!("{what}: not within {tenths} tenths; {:?}, {:?}", positions(site), active(site));
 }

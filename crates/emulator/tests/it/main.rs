@@ -3,10 +3,12 @@
 
 mod acc1700;
 mod control;
+mod datakom_d;
 mod dkg705;
 mod golden;
 mod hat821si;
 mod identities;
+mod levers;
 #[cfg(target_os = "linux")]
 mod lines;
 mod openapi;

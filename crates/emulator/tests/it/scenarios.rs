@@ -21,11 +21,33 @@ macro_rules! scenarios {
 }
 
 scenarios! {
-    datakom_d_weekly_test: "weekly-test.toml",
+    mains_failure_and_return: "mains-failure.toml",
+    short_dip_that_must_not_start: "short-dip.toml",
+    start_on_the_third_attempt: "third-attempt.toml",
+    fail_to_start: "fail-to-start.toml",
+    low_oil_pressure_shutdown: "low-oil-pressure.toml",
+    overheating: "overheating.toml",
+    overload_load_dump: "overload.toml",
+    breaker_that_will_not_close: "breaker-will-not-close.toml",
+    fuel_running_out: "fuel-running-out.toml",
+    battery_dying: "battery-dying.toml",
+    weekly_test_under_load: "weekly-test.toml",
+    emergency_stop: "emergency-stop.toml",
+    remote_start: "remote-start.toml",
+    synchronised_soft_transfer: "soft-transfer.toml",
+    peak_lopping: "peak-lopping.toml",
     dkg705_mains_failure: "dkg705-mains-failure.toml",
     dkg705_short_dip: "dkg705-short-dip.toml",
     dkg705_soft_transfer: "dkg705-soft-transfer.toml",
-    acc1700_day: "compressor-day.toml",
+    bus_tie_with_one_source_dead: "bus-tie.toml",
+    tie_that_will_not_close: "tie-will-not-close.toml",
+    load_shedding_stepwise: "load-shedding.toml",
+    both_sources_dead: "both-sources-dead.toml",
+    switch_in_test_position: "switch-in-test-position.toml",
+    remote_transfer: "remote-transfer.toml",
+    compressor_day: "compressor-day.toml",
+    compressor_hot_discharge: "compressor-hot-discharge.toml",
+    compressor_locked: "compressor-locked.toml",
 }
 
 #[test]
@@ -33,6 +55,17 @@ fn every_file_is_played() {
     let files = fs::read_dir(folder()).unwrap();
     let names: BTreeSet<_> = files.map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
     assert_eq!(names, PLAYED.iter().map(|name| (*name).to_owned()).collect());
+}
+
+#[test]
+fn the_documentation_lists_every_file() {
+    let page = fs::read_to_string(root().join("docs/scenarios.md")).unwrap();
+    for name in PLAYED {
+        let text = fs::read_to_string(folder().join(name)).unwrap();
+        let scenario = Scenario::parse(name, &text).unwrap();
+        let row = format!("| `{name}` | `{}` | {} |", scenario.controller(), scenario.title());
+        assert!(page.contains(&row), "docs/scenarios.md lacks this row:\n{row}");
+    }
 }
 
 #[test]

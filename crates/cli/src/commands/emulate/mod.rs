@@ -8,12 +8,15 @@ use busbar_profile::DateTime;
 use jiff::Zoned;
 use serde::Serialize;
 
+use super::{control, run};
 use crate::{args, failure::Failure, logging, profiles, runtime, terminal, wall_clock};
 
 /// Where it answers, as `--json` prints it.
 #[derive(Serialize)]
 struct Bound<'a> {
     urls: &'a [Endpoint],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    control: Option<String>,
 }
 
 pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
@@ -34,13 +37,23 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
         pins: usual.pins.into_iter().chain(args.set).collect(),
         ..usual
     };
+    let token = control::token()?;
     runtime::service(async |mut stop| {
         let emulation = busbar_emulator::start(config).await.map_err(failure)?;
+        let control = match args.control {
+            Some(address) => Some(control::serve(address, &emulation, token).await?),
+            None => None,
+        };
+        let (urls, page) = (emulation.urls(), control.as_ref().map(|control| run::page(control.address())));
         if !json {
-            let lines: Vec<String> = emulation.urls().iter().map(|url| format!("{url}\n")).collect();
+            let mut lines: Vec<String> = urls.iter().map(|url| format!("{url}\n")).collect();
+            lines.extend(page.map(|page| format!("control {page}\n")));
             terminal::print(&lines.concat())?;
         } else if !is_played {
-            terminal::print_json(&Bound { urls: emulation.urls() })?;
+            terminal::print_json(&Bound { urls, control: page })?;
+        } else if let Some(page) = page {
+            // Standard output is for the one document about the scenario.
+            terminal::message(&format!("control {page}"));
         }
         let done = if is_played {
             scenario::play(&emulation, &mut stop, json).await
@@ -48,6 +61,9 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
             stop.wait().await;
             Ok(())
         };
+        if let Some(control) = control {
+            control.stop().await;
+        }
         emulation.stop().await;
         done
     })

@@ -39,8 +39,10 @@ pub(super) async fn play(emulation: &Emulation, stop: &mut Stop, json: bool) -> 
     let mut ticks = interval(LOOK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut told = 0;
-    let title =
-        emulation.report(0, |report| format!("{:>9} s  {}: {}\n", "0.0", report.title, report.controller));
+    let title = report(emulation, |report| {
+        let Report { title, controller, model, seed, .. } = report;
+        format!("{:>9} s  {title}: {controller}, {model}, seed {seed}\n", "0.0")
+    });
     terminal::error_text(&title.unwrap_or_default());
     loop {
         select! {
@@ -50,7 +52,7 @@ pub(super) async fn play(emulation: &Emulation, stop: &mut Stop, json: bool) -> 
             }
             _ = ticks.tick() => {}
         }
-        let news = emulation.report(0, |report| {
+        let news = report(emulation, |report| {
             let lines: String = report.events.iter().skip(told).map(line).collect();
             told = report.events.len();
             (lines, report.is_over().then(|| report.clone()))
@@ -61,6 +63,11 @@ pub(super) async fn play(emulation: &Emulation, stop: &mut Stop, json: bool) -> 
             return conclude(emulation, &report, json);
         }
     }
+}
+
+/// Looks at what has become of the scenario so far.
+fn report<T>(emulation: &Emulation, look: impl FnOnce(&Report) -> T) -> Option<T> {
+    emulation.controllers().first()?.with(|device| device.report().map(look))
 }
 
 fn conclude(emulation: &Emulation, report: &Report, json: bool) -> Result<(), Failure> {

@@ -195,7 +195,7 @@ fn an_engine_that_dies_while_it_warms_up_is_cranked_again() {
     }
     for last in [false, false, true] {
         assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, fired), IdleSpeed);
-        assert_eq!(sequence.failures.to_start, false);
+        assert!(!sequence.failures.to_start);
         let next = until_change(&mut sequence, Demand::ON_LOAD, dead);
         assert_eq!(next, if last { Stopping } else { CrankRest });
         if !last {
@@ -319,7 +319,7 @@ mod chance {
 
     use crate::random::Random;
 
-    use super::super::super::operation::TRANSITIONS;
+    use super::super::super::transitions::TRANSITIONS;
     use super::*;
 
     fn is_listed(from: Operation, to: Operation) -> bool {

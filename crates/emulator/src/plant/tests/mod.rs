@@ -3,6 +3,7 @@
 mod faults;
 mod life;
 mod parallel;
+mod properties;
 
 use crate::levers::{Lever, Position};
 

@@ -187,7 +187,7 @@ fn a_door_is_an_indication_and_no_alarm() {
     site.pass(TENTH);
     assert!(alarm(&site, "input_5_indication") && !common(&site, 0));
     assert!(!site.bits("input_signals").contains(5) && site.bits("active_inputs").contains(4));
-    pull(&mut site, "door", "closed");
+    pull(&mut site, "door", "shut");
     site.pass(TENTH);
     assert!(!alarm(&site, "input_5_indication"));
 }
