@@ -19,8 +19,9 @@ class Program {
   }
 
   /** Runs `busbar` with these arguments until a line of it holds what is looked for. */
-  protected static async spawn(args: string[], wanted: RegExp): Promise<[string, ChildProcess]> {
-    const child = spawn(BINARY, args, { stdio: ['ignore', 'pipe', 'pipe'] })
+  protected static async spawn(args: string[], wanted: RegExp, env = {}): Promise<[string, ChildProcess]> {
+    const stdio = ['ignore', 'pipe', 'pipe'] as ['ignore', 'pipe', 'pipe']
+    const child = spawn(BINARY, args, { stdio, env: { ...process.env, ...env } })
     const stray = () => child.kill('SIGKILL')
     process.once('exit', stray)
     child.once('exit', () => process.off('exit', stray))
@@ -82,17 +83,23 @@ export class Demo extends Program {
 
 /** `busbar emulate`: one imitated controller. */
 export class Controller extends Program {
+  /** What its control asks for, where it has one. */
+  static readonly TOKEN = 'a-token-for-tests-alone'
+
   private constructor(
     readonly url: string,
+    /** Its control's page, where it has one. */
+    readonly control: string,
     child: ChildProcess,
   ) {
     super(child)
   }
 
   static async start(key: string, listen: string, ...rest: string[]): Promise<Controller> {
-    return new Controller(
-      ...(await Program.spawn(['emulate', '--listen', listen, ...rest, key], /\S+:\/\/\S+/)),
-    )
+    const args = ['emulate', '--json', '--listen', listen, ...rest, key]
+    const [said, child] = await Program.spawn(args, /^\{.*\}$/, { BUSBAR_CONTROL_TOKEN: Controller.TOKEN })
+    const { urls, control } = JSON.parse(said) as { urls: [string]; control?: string }
+    return new Controller(urls[0], control ?? '', child)
   }
 }
 

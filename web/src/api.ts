@@ -344,6 +344,19 @@ export interface components {
              */
             device: string;
         };
+        /** @description Something that is served beside the gateway. */
+        BesideView: {
+            /**
+             * @description What it is called.
+             * @example Imitation
+             */
+            name: string;
+            /**
+             * @description Its page, seen from this one.
+             * @example imitation/
+             */
+            path: string;
+        };
         /** @description One named bit of a bit array. */
         BitView: {
             /**
@@ -932,6 +945,8 @@ export interface components {
         ResumedEvent: Record<string, never>;
         /** @description The site, without its devices. */
         SiteInfo: {
+            /** @description What else is served here that has a page of its own. */
+            beside: components["schemas"]["BesideView"][];
             /** @description Which site file runs. */
             config: components["schemas"]["ConfigView"];
             /**

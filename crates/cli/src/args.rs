@@ -117,6 +117,13 @@ pub(crate) struct Emulate {
     /// Hold a point at a value; may be repeated
     #[arg(long, value_name = "POINT=VALUE", value_parser = pin)]
     pub(crate) set: Vec<(String, String)>,
+    /// Where its control is served, an HTTP API with a page: levers, alarms, clock; port 0 takes a free one. Beyond this
+    /// machine BUSBAR_CONTROL_TOKEN must hold a token of 16 characters or more
+    #[arg(long, value_name = "ADDR:PORT", value_parser = socket_address)]
+    pub(crate) control: Option<SocketAddr>,
+    /// Play a scenario and end with it: 0 when all that it expects came, 1 when not, 2 when the file is wrong
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scenario: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]

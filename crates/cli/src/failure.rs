@@ -15,6 +15,8 @@ pub(crate) enum Failure {
     Failed(String),
     /// A file is wrong in places that can be shown: exit status 1.
     Findings(Box<Excerpts>),
+    /// The call names a file that is wrong in places that can be shown, where 1 means something else: exit status 2.
+    CallFindings(Box<Excerpts>),
     /// The command failed and its own output says how: exit status 1.
     Reported,
     /// Standard output took no more. A closed pipe is the reader's way to say that it has seen enough.
@@ -31,7 +33,7 @@ impl Failure {
     pub(crate) fn sentences(&self) -> Vec<String> {
         match self {
             Self::Call(sentence) | Self::Failed(sentence) => vec![sentence.clone()],
-            Self::Findings(excerpts) => excerpts.sentences().collect(),
+            Self::Findings(excerpts) | Self::CallFindings(excerpts) => excerpts.sentences().collect(),
             Self::Output(error) => vec![error.to_string()],
             Self::Help(_) | Self::Reported => Vec::new(),
         }
@@ -55,6 +57,10 @@ impl Failure {
             Self::Findings(excerpts) => {
                 terminal::error_text(&excerpts.render(terminal::error_is_coloured()));
                 ExitCode::FAILURE
+            }
+            Self::CallFindings(excerpts) => {
+                terminal::error_text(&excerpts.render(terminal::error_is_coloured()));
+                ExitCode::from(2)
             }
             Self::Reported => ExitCode::FAILURE,
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,

@@ -180,6 +180,25 @@ impl Bank {
         }
     }
 
+    /// Stores what the device sends where a sensor is broken: the last of the point's sentinels.
+    pub(crate) fn broken(&mut self, address: u16) {
+        let Some((index, point)) = self.indexed(address) else { return self.refuse() };
+        if self.pinned[index] {
+            return;
+        }
+        let sentinel = point.sentinels.last().and_then(|sentinel| u16::try_from(*sentinel).ok());
+        let stored = match (sentinel, self.slots(point)) {
+            (Some(sentinel), Some([register])) => {
+                *register = sentinel;
+                true
+            }
+            _ => false,
+        };
+        if !stored {
+            self.refuse();
+        }
+    }
+
     /// The bits that stand at an address now, pinned or not.
     pub(crate) fn bits_shown(&self, address: u16) -> BitSet {
         let registers = self.point(address).and_then(|point| self.read(address, point.registers));

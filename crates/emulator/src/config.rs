@@ -5,6 +5,8 @@ use std::time::Duration;
 use busbar_link::Endpoint;
 use busbar_profile::DateTime;
 
+use crate::scenario::Scenario;
+
 /// 5 January 2026 at ten, after the first instant of 2000.
 const MONDAY_MORNING: Duration = Duration::from_secs(9501 * 86_400 + 10 * 3600);
 
@@ -28,6 +30,8 @@ pub struct Config {
     pub pins: Vec<(String, String)>,
     /// Something happens at the site by itself: the demonstration wants it.
     pub story: bool,
+    /// What happens to it, and what is expected of it.
+    pub scenario: Option<Scenario>,
     /// What the calendar of a controller that has one says at power-on. Nothing else depends on it: the weather, the
     /// story and every other register follow the seed and the time that has passed.
     pub epoch: DateTime,
@@ -48,6 +52,7 @@ impl Default for Config {
             speed: 1.0,
             pins: Vec::new(),
             story: false,
+            scenario: None,
             epoch: DateTime::FIRST.plus(MONDAY_MORNING),
             connections: 128,
             idle: Duration::from_secs(300),

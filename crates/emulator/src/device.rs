@@ -16,6 +16,7 @@ use crate::panel::Panel;
 use crate::pins;
 use crate::random::Random;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
+use crate::scenario::{Player, Report};
 use crate::settings::{SettingError, Settings};
 use crate::smartgen_acc1700::{Acc1700, Model};
 use crate::smartgen_hat821si::Hat821si;
@@ -39,8 +40,10 @@ pub struct Device {
     /// Alarms that were injected, by point and bit.
     injected: Vec<Alarm>,
     clock: Duration,
+    model: String,
     seed: u64,
     answer_delay: Duration,
+    player: Option<Player>,
 }
 
 impl Device {
@@ -55,7 +58,13 @@ impl Device {
         if !(range.min..=range.max).contains(&config.unit) {
             return Err(StartError::Unit { unit: config.unit, min: range.min, max: range.max });
         }
-        let mut panel = panel(profile, config)?;
+        if let Some(scenario) =
+            config.scenario.as_ref().filter(|scenario| scenario.controller() != profile.key)
+        {
+            let (title, controller) = (scenario.title().to_owned(), scenario.controller());
+            return Err(StartError::OtherController { title, controller, key: profile.key.clone() });
+        }
+        let (mut panel, model) = panel(profile, config)?;
         let (mut bank, mut settings) = (Bank::new(profile), Settings::of(profile));
         for (name, text) in &config.pins {
             if profile.setting(name).is_some() {
@@ -77,10 +86,13 @@ impl Device {
             settings,
             injected: Vec::new(),
             clock: Duration::ZERO,
+            model: model.to_owned(),
             seed,
             answer_delay,
+            player: config.scenario.as_ref().map(|scenario| Player::new(scenario, model, seed)),
         };
         device.stir();
+        device.play();
         Ok(device)
     }
 
@@ -91,6 +103,10 @@ impl Device {
             self.panel.step(STEP);
             self.clock += STEP;
             moved = true;
+            if self.report().is_some_and(|report| !report.is_over()) {
+                self.panel.render(&mut self.bank);
+                self.play();
+            }
         }
         if moved {
             self.panel.render(&mut self.bank);
@@ -139,6 +155,16 @@ impl Device {
     /// The unit id that it answers to.
     pub fn unit(&self) -> u8 {
         self.unit
+    }
+
+    /// Its model, as the profile writes it.
+    pub fn model(&self) -> &str {
+        &self.model
+    }
+
+    /// The seed of everything that is left to chance.
+    pub fn seed(&self) -> u64 {
+        self.seed
     }
 
     /// It answers no sooner than this after a request.
@@ -256,6 +282,11 @@ impl Device {
         Ok(())
     }
 
+    /// What has become of its scenario; none where it has none.
+    pub fn report(&self) -> Option<&Report> {
+        self.player.as_ref().map(Player::report)
+    }
+
     /// The profile that it follows.
     pub fn profile(&self) -> &'static Profile {
         self.bank.profile()
@@ -264,6 +295,14 @@ impl Device {
     /// How many values of the panel its profile could not hold since power-on; anything but 0 is our fault.
     pub fn misfits(&self) -> u64 {
         self.bank.refused()
+    }
+
+    /// Lets the scenario go on: what it reads is what a client would read now.
+    fn play(&mut self) {
+        if let Some(mut player) = self.player.take() {
+            player.go_on(self);
+            self.player = Some(player);
+        }
     }
 
     /// Noise that depends on the seed and the time alone, however time was let pass.
@@ -281,21 +320,22 @@ impl Device {
     }
 }
 
-fn panel(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
+/// The panel of a profile, and the model that it is.
+fn panel(profile: &'static Profile, config: &Config) -> Result<(Box<dyn Panel>, &'static str), StartError> {
     match profile.key.as_str() {
         "datakom-d" => datakom_d(profile, config),
         "datakom-dkg705" => {
             // There is one.
-            chosen(&profile.models, config, "DKG-705")?;
-            Ok(Box::new(DatakomDkg705::new(config.seed, config.story).starting(config.epoch)))
+            let model = chosen(&profile.models, config, "DKG-705")?;
+            Ok((Box::new(DatakomDkg705::new(config.seed, config.story).starting(config.epoch)), model))
         }
         "smartgen-acc1700" => {
-            let model = Model::of(chosen(&profile.models, config, "ACC1700CAN")?);
-            Ok(Box::new(Acc1700::new(model, config.seed, config.story)))
+            let model = chosen(&profile.models, config, "ACC1700CAN")?;
+            Ok((Box::new(Acc1700::new(profile, Model::of(model), config.seed, config.story)), model))
         }
         "smartgen-hat821si" => {
-            chosen(&profile.models, config, "HAT821SI")?;
-            Ok(Box::new(Hat821si::new(config.seed, config.story).starting(config.epoch)))
+            let model = chosen(&profile.models, config, "HAT821SI")?;
+            Ok((Box::new(Hat821si::new(config.seed, config.story).starting(config.epoch)), model))
         }
         _ => Err(StartError::NotImitated { key: profile.key.clone(), imitated: IMITATED.to_vec() }),
     }
@@ -310,7 +350,10 @@ fn chosen<'a>(models: &'a [String], config: &Config, default: &str) -> Result<&'
         .ok_or_else(|| StartError::UnknownModel { model: wanted.to_owned(), allowed: models.to_vec() })
 }
 
-fn datakom_d(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, StartError> {
+fn datakom_d(
+    profile: &'static Profile,
+    config: &Config,
+) -> Result<(Box<dyn Panel>, &'static str), StartError> {
     let wanted = config.model.as_deref().unwrap_or("D-500");
     // Every unit that its identity tells apart, with those the manual's title does not name.
     let known = profile.identity.as_ref().map_or(&[][..], |identity| &identity.models);
@@ -318,5 +361,5 @@ fn datakom_d(profile: &Profile, config: &Config) -> Result<Box<dyn Panel>, Start
         let allowed = known.iter().map(|known| known.model.clone()).collect();
         return Err(StartError::UnknownModel { model: wanted.to_owned(), allowed });
     };
-    Ok(Box::new(DatakomD::new(&known.model, known.value, config.seed, config.story)))
+    Ok((Box::new(DatakomD::new(&known.model, known.value, config.seed, config.story)), &known.model))
 }

@@ -5,6 +5,7 @@ use std::io;
 use busbar_link::{Endpoint, SerialError};
 use busbar_profile::{Number, SerialSettings};
 
+use crate::server::SpeedError;
 use crate::settings::SettingError;
 
 /// An imitation was not started; nothing is left running.
@@ -44,17 +45,26 @@ pub enum StartError {
         max: u8,
     },
     /// The simulated clock cannot run that fast.
-    #[error("speed {speed} is not possible, choose a number above 0 and up to {}", crate::MAX_SPEED)]
-    Speed {
-        /// What was asked for, as text.
-        speed: String,
-    },
+    #[error(transparent)]
+    Speed(#[from] SpeedError),
     /// A value was pinned that its point cannot have.
     #[error(transparent)]
     Pin(#[from] PinError),
     /// The controller was to be set to something that it cannot be set to.
     #[error(transparent)]
     Setting(#[from] SettingError),
+    /// The scenario happens to another controller.
+    #[error(
+        "the scenario \"{title}\" is for {controller}, not for {key}; imitate {controller}, or choose another one"
+    )]
+    OtherController {
+        /// What the scenario is called.
+        title: String,
+        /// The profile that it is for.
+        controller: &'static str,
+        /// What was to be imitated.
+        key: String,
+    },
     /// Nothing was given to imitate.
     #[error("there is no controller to imitate; name at least one")]
     NoController,
@@ -193,7 +203,7 @@ pub enum PinProblem {
     },
 }
 
-fn listen_reason(kind: io::ErrorKind) -> String {
+pub(crate) fn listen_reason(kind: io::ErrorKind) -> String {
     match kind {
         io::ErrorKind::AddrInUse => "the port is taken; stop the other program or choose another port".into(),
         io::ErrorKind::PermissionDenied => "this user may not use that port; choose one above 1023".into(),

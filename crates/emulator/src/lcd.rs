@@ -17,6 +17,7 @@ impl Canvas {
         Self { rows: [0; HEIGHT] }
     }
 
+    #[cfg(test)]
     pub(crate) fn is_set(&self, x: usize, y: usize) -> bool {
         x < WIDTH && self.rows.get(y).is_some_and(|row| row >> x & 1 == 1)
     }
@@ -27,11 +28,8 @@ impl Canvas {
         for (position, letter) in (column..).zip(letters) {
             for (y, bits) in glyph(letter).into_iter().enumerate() {
                 let Some(row) = self.rows.get_mut(line * 8 + y) else { return };
-                for x in 0..5 {
-                    // The font is written as it looks: its leftmost pixel is the highest bit.
-                    let pixel = u128::from(bits >> (4 - x) & 1);
-                    *row |= pixel << (position * 6 + x);
-                }
+                // The font is written as it looks: its leftmost pixel is the highest of five bits.
+                *row |= u128::from(bits.reverse_bits() >> 3) << (position * 6);
             }
         }
     }
@@ -40,6 +38,30 @@ impl Canvas {
     pub(crate) fn text_right(&mut self, line: usize, text: &str) {
         let length = text.chars().count().min(COLUMNS);
         self.text(line, COLUMNS - length, text);
+    }
+
+    /// Lights a pixel; what lies outside is cut.
+    pub(crate) fn dot(&mut self, x: usize, y: usize) {
+        if let Some(row) = self.rows.get_mut(y).filter(|_| x < WIDTH) {
+            *row |= 1 << x;
+        }
+    }
+
+    /// Fills a rectangle.
+    pub(crate) fn fill(&mut self, x: usize, y: usize, width: usize, height: usize) {
+        for y in y..y + height {
+            for x in x..x + width {
+                self.dot(x, y);
+            }
+        }
+    }
+
+    /// Draws the edge of a rectangle.
+    pub(crate) fn frame(&mut self, x: usize, y: usize, width: usize, height: usize) {
+        self.fill(x, y, width, 1);
+        self.fill(x, y + height.saturating_sub(1), width, 1);
+        self.fill(x, y, 1, height);
+        self.fill(x + width.saturating_sub(1), y, 1, height);
     }
 
     /// Turns light and dark round in one line of text.
@@ -56,16 +78,29 @@ impl Canvas {
     pub(crate) fn datakom_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(WIDTH * HEIGHT / 8);
         for page in 0..HEIGHT / 8 {
-            for pair in 0..WIDTH / 2 {
-                let column = |x: usize| -> u8 {
-                    (0..8).map(|bit| u8::from(self.is_set(x, HEIGHT - 1 - 8 * page - bit)) << bit).sum()
-                };
-                bytes.push(column(2 * pair + 1));
-                bytes.push(column(2 * pair));
+            let rows: [u128; 8] = std::array::from_fn(|bit| self.rows[HEIGHT - 1 - 8 * page - bit]);
+            for x in (0..WIDTH).step_by(8) {
+                let columns = transposed(rows.map(|row| (row >> x) as u8));
+                for pair in columns.chunks_exact(2) {
+                    bytes.extend_from_slice(&[pair[1], pair[0]]);
+                }
             }
         }
         bytes
     }
+}
+
+/// Rows of eight pixels as columns: bit `c` of byte `r` becomes bit `r` of byte `c`.
+///
+/// The picture is taken for every image of the registers; pixel by pixel it would cost more than all the rest.
+fn transposed(rows: [u8; 8]) -> [u8; 8] {
+    let mut block = u64::from_le_bytes(rows);
+    // Bits change places across the diagonal, then pairs of them, then fours.
+    for (distance, mask) in [(7, 0x00AA_00AA_00AA_00AA), (14, 0x0000_CCCC_0000_CCCC), (28, 0xF0F0_F0F0)] {
+        let differing = (block ^ (block >> distance)) & mask;
+        block ^= differing ^ (differing << distance);
+    }
+    block.to_le_bytes()
 }
 
 /// Rows of a letter from the top, five pixels each; a letter the font does not have is a box.
@@ -114,6 +149,9 @@ fn glyph(letter: char) -> [u8; 7] {
         '-' => [0, 0, 0, 0b11111, 0, 0, 0],
         '/' => [0b00001, 0b00001, 0b00010, 0b00100, 0b01000, 0b10000, 0b10000],
         '%' => [0b11001, 0b11001, 0b00010, 0b00100, 0b01000, 0b10011, 0b10011],
+        '+' => [0, 0b00100, 0b00100, 0b11111, 0b00100, 0b00100, 0],
+        '=' => [0, 0, 0b11111, 0, 0b11111, 0, 0],
+        '>' => [0b01000, 0b00100, 0b00010, 0b00001, 0b00010, 0b00100, 0b01000],
         '!' => [0b00100, 0b00100, 0b00100, 0b00100, 0b00100, 0, 0b00100],
         '(' => [0b00010, 0b00100, 0b01000, 0b01000, 0b01000, 0b00100, 0b00010],
         ')' => [0b01000, 0b00100, 0b00010, 0b00010, 0b00010, 0b00100, 0b01000],
@@ -151,6 +189,17 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_is_hollow_and_nothing_is_drawn_outside() {
+        let mut canvas = Canvas::new();
+        canvas.frame(1, 1, 4, 3);
+        canvas.fill(127, 63, 5, 5);
+        canvas.dot(128, 0);
+        canvas.dot(0, 64);
+        assert_eq!(drawn(&canvas, 6, 5), ["......", ".####.", ".#..#.", ".####.", "......"]);
+        assert!(canvas.is_set(127, 63) && !canvas.is_set(126, 63));
+    }
+
+    #[test]
     fn text_beyond_the_edges_is_cut() {
         let mut canvas = Canvas::new();
         canvas.text(0, 20, "AB");
@@ -159,6 +208,18 @@ mod tests {
         canvas.text_right(7, "a text that is much longer than a line");
         assert!((126..128).all(|x| !canvas.is_set(x, 0)));
         assert!(canvas.is_set(1, 56), "the line starts at the left edge");
+    }
+
+    #[test]
+    fn eight_rows_become_eight_columns() {
+        let rows = [0b1000_0001, 2, 0, 0b0101_0101, 0, 0, 0xFF, 0x80];
+        let columns = transposed(rows);
+        for (r, row) in rows.into_iter().enumerate() {
+            for (c, column) in columns.into_iter().enumerate() {
+                assert_eq!(row >> c & 1, column >> r & 1, "{r} {c}");
+            }
+        }
+        assert_eq!(transposed(columns), rows);
     }
 
     #[test]

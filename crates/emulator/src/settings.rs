@@ -50,7 +50,7 @@ impl Settings {
         let number =
             text.parse::<Number>().ok().filter(|number| (setting.min..=setting.max).contains(number));
         let Some(number) = number else {
-            return Err(SettingError::Range { setting: setting.clone(), text: text.to_owned() });
+            return Err(SettingError::Range { setting, text: text.to_owned() });
         };
         *value = number.as_f64();
         Ok(())
@@ -77,7 +77,7 @@ pub enum SettingError {
     )]
     Range {
         /// The setting.
-        setting: Setting,
+        setting: &'static Setting,
         /// What was asked for.
         text: String,
     },

@@ -90,20 +90,26 @@ impl Distortion {
         let distortion = squares.sqrt();
         // The meter's rms is that of the whole wave.
         let peak = SQRT_2 * rms / (1.0 + squares / 10_000.0).sqrt();
-        let trace = std::array::from_fn(|sample| {
-            let turn = sample as f64 / SAMPLES as f64 - lag;
-            let wave: f64 = harmonics
-                .iter()
-                .enumerate()
-                .map(|(index, part)| {
-                    let order = order(index) as f64;
-                    // Each harmonic has an angle of its own; any will do as long as it stays.
-                    part / 100.0 * (TAU * (order * turn + 0.11 * order * order)).sin()
-                })
-                .sum();
-            (10.0 * peak * ((TAU * turn).sin() + wave)).round() as i16
-        });
+        let mut wave = [0.0; SAMPLES];
+        add(&mut wave, 1.0, 1.0, -lag * TAU);
+        for (index, part) in harmonics.iter().enumerate().filter(|(_, part)| **part > 0.0) {
+            let order = order(index) as f64;
+            // Each harmonic has an angle of its own; any will do as long as it stays.
+            add(&mut wave, part / 100.0, order, (0.11 * order * order - order * lag) * TAU);
+        }
+        let trace = wave.map(|value| (10.0 * peak * value).round() as i16);
         Analysis { fundamental: 100.0, harmonics, distortion, trace }
+    }
+}
+
+/// Adds a sine of so many periods that starts at an angle.
+fn add(wave: &mut [f64; SAMPLES], amplitude: f64, periods: f64, from: f64) {
+    // The pointer turns by the same angle from sample to sample.
+    let (turn_sine, turn_cosine) = (TAU * periods / SAMPLES as f64).sin_cos();
+    let (mut sine, mut cosine) = from.sin_cos();
+    for value in wave {
+        *value += amplitude * sine;
+        (sine, cosine) = (sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine);
     }
 }
 

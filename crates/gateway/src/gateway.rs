@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::Router;
 use busbar_link::OpenError;
 use thiserror::Error;
 use tokio::net::TcpListener;
@@ -29,6 +30,19 @@ pub struct Options {
     pub listen: Option<SocketAddr>,
     /// What clients may ask of the server; none: what suits this process.
     pub limits: Option<Limits>,
+    /// What is served beside the API and the page.
+    pub beside: Vec<Beside>,
+}
+
+/// Something that is served beside the API and the page, and that the gateway knows nothing of but where it is.
+#[derive(Debug, Clone)]
+pub struct Beside {
+    /// The folder that it is served below, such as `imitation`; none of the gateway's own, `api` and `assets`.
+    pub folder: String,
+    /// What the page calls the link to it.
+    pub name: String,
+    /// Its routes, which see addresses without the folder. Hosts and connections are guarded as the gateway's own.
+    pub routes: Router,
 }
 
 /// Why a gateway did not start. Nothing of it runs then.
@@ -87,12 +101,13 @@ pub async fn start(site: Site, options: Options) -> Result<Gateway, StartError> 
     warn(&site);
 
     let (stop, stopped) = stop::channel();
-    let hub = Arc::new(Hub::new(running.table(&site), stopped));
+    let hub = Hub::new(running.table(&site), stopped).beside(&options.beside);
+    let hub = Arc::new(hub);
     let mut tasks = JoinSet::new();
     running.poll(Running::default(), &hub, &mut tasks);
     tasks.spawn(age(Arc::clone(&hub)));
     tasks.spawn(events::beat(Arc::clone(&hub)));
-    let service = server::Service { listener, address, limits: options.limits };
+    let service = server::Service { listener, address, limits: options.limits, beside: options.beside };
     tasks.spawn(server::serve(service, Arc::clone(&hub)));
     tracing::info!(%address, devices = site.devices.len(), "gateway started");
     Ok(Gateway { address, asked: site.listen, stop, tasks, hub, running })

@@ -13,12 +13,13 @@ use busbar_profile::{Profile, Rate};
 use tokio::time::Instant;
 
 use crate::api::types::{
-    AlarmView, AlarmsEvent, ConfigView, DeviceView, JoinedView, PointsView, RefusedView, SiteInfo, SiteView,
-    Time, ValueView, WireDetailView, WireView,
+    AlarmView, AlarmsEvent, BesideView, ConfigView, DeviceView, JoinedView, PointsView, RefusedView,
+    SiteInfo, SiteView, Time, ValueView, WireDetailView, WireView,
 };
 use crate::api::{PointsQuery, Problem, ValuesQuery};
 use crate::device::{Changes, Device, Round, points_view};
 use crate::events::{Channel, Draft};
+use crate::gateway::Beside;
 use crate::health::Health;
 use crate::joined;
 use crate::poll_plan::Overview;
@@ -40,6 +41,7 @@ pub(crate) struct Hub {
     stop: Stop,
     origin: Instant,
     health: Health,
+    beside: Vec<BesideView>,
 }
 
 /// What became of the site files.
@@ -61,7 +63,14 @@ impl Hub {
             stop,
             origin: Instant::now(),
             health: Health::default(),
+            beside: Vec::new(),
         }
+    }
+
+    /// The same hub, which says what else is served.
+    pub(crate) fn beside(mut self, beside: &[Beside]) -> Self {
+        self.beside = beside.iter().map(BesideView::of).collect();
+        self
     }
 
     /// Time since the gateway started: the clock of every poller.
@@ -195,6 +204,7 @@ impl Hub {
             time_zone: table.time_zone.clone(),
             revision: config.revision,
             config: config.view.clone(),
+            beside: self.beside.clone(),
         }
     }
 

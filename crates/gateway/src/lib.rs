@@ -34,7 +34,7 @@ mod testing;
 mod wires;
 
 pub use crate::api::openapi;
-pub use crate::gateway::{Gateway, Options, StartError, start};
+pub use crate::gateway::{Beside, Gateway, Options, StartError, start};
 pub use crate::server::Limits;
 pub use crate::site::{
     Connection, DEFAULT_LISTEN, Diagram, Nameplate, Node, NodeKind, Poll, Site, SiteDevice, SiteWire,

@@ -93,11 +93,23 @@ impl Joined {
     ///
     /// `profile` must be the one that it belongs to.
     pub fn reading(&self, profile: &Profile, image: &Image, order: WordOrder) -> Option<JoinedReading> {
+        self.reading_of(profile, order, |index| image.registers(index))
+    }
+
+    /// The value out of the registers of its points, asked for by their index; none where one of them has none.
+    ///
+    /// `profile` must be the one that it belongs to.
+    pub fn reading_of<'r>(
+        &self,
+        profile: &Profile,
+        order: WordOrder,
+        registers: impl Fn(usize) -> Option<&'r [u16]>,
+    ) -> Option<JoinedReading> {
         let mut parts = [0; 6];
         let mut valid = true;
         for (part, index) in parts.iter_mut().zip(self.points()) {
             let point = profile.points.get(index)?;
-            let value = point.decode(image.registers(index)?, order).value;
+            let value = point.decode(registers(index)?, order).value;
             match value.and_then(|value| value.as_number()?.as_integer()) {
                 Some(number) => *part = number,
                 None => valid = false,

@@ -104,6 +104,23 @@ fn keys_and_types() {
 }
 
 #[test]
+fn settings_of_the_imitation() {
+    check(
+        "settings_of_the_imitation",
+        report(&[
+            ("id = \"crank_time\"", "id = \"Crank time\""),
+            ("id = \"crank_time\"", "id = \"start_attempts\""),
+            ("id = \"crank_time\"", "id = \"delay\""),
+            ("name = \"Crank timer\"", "name = \" \""),
+            ("value = 6, min", "value = 0, min"),
+            ("max = 99, unit", "max = 5, unit"),
+            ("max = 99, unit", "max = \"99\", unit"),
+            ("settings = [", "timers = ["),
+        ]),
+    );
+}
+
+#[test]
 fn several_mistakes_are_found_at_once() {
     let text = edited("type = \"sm24\"", "type = \"sm42\"")
         .replacen("name = \"Brand\"", "nam = \"Brand\"", 1)

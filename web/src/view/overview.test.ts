@@ -184,3 +184,13 @@ test('a name is text, whatever stands in it', () => {
   expect(card('gen1').querySelector('h2')?.textContent).toBe(name)
   expect(document.querySelector('img')).toBeNull()
 })
+
+test('what else is served here is a link, and a gateway alone has none', () => {
+  const whole = snapshot([{ device: device('gen1'), values: [] }])
+  show(whole)
+  const links = () => [...document.querySelectorAll('nav a')].map((link) => link.getAttribute('href'))
+  expect(links()).toEqual(['#/', '#/wires', '#/devices/gen1'])
+  emit('site', { ...whole.site, beside: [{ name: 'Imitation', path: 'imitation/' }] })
+  expect(links()).toEqual(['#/', '#/wires', 'imitation/', '#/devices/gen1'])
+  expect(text(document.querySelector('nav a[href="imitation/"]'))).toBe('Imitation')
+})

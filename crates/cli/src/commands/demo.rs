@@ -1,14 +1,18 @@
 //! `busbar demo`: a whole site on this machine.
 
 use std::io;
+use std::net::SocketAddr;
 
-use busbar_emulator::{Config, Emulation, StartError};
-use busbar_gateway::Site;
+use busbar_emulator::{
+    Config, Emulation, StartError,
+    control::{Control, Imitated, may_listen, router},
+};
+use busbar_gateway::{Beside, Site};
 use busbar_link::Endpoint;
 use jiff::tz::{TimeZone, TimeZoneDatabase};
 use serde::Serialize;
 
-use super::{emulate, run};
+use super::{control, emulate, run};
 use crate::{args, failure::Failure, logging, runtime, terminal};
 
 /// Easy to remember for a person's own Modbus tools; any free port when it is taken.
@@ -17,12 +21,17 @@ const USUAL_PORT: u16 = 1502;
 /// The serial line of the site: one wire, three units.
 const LINE: &str = "rtu://pty?baud=9600&parity=none&stop=1";
 
+/// The folder of the page that the imitation is controlled in.
+const IMITATION: &str = "imitation";
+
 /// The site, with places for what is known once the imitations listen.
 const SITE: &str = include_str!("demo.toml");
 
 /// One controller of the site, as it is imitated.
 struct Member {
     id: &'static str,
+    /// What the site calls it.
+    name: &'static str,
     key: &'static str,
     model: &'static str,
     unit: u8,
@@ -30,13 +39,27 @@ struct Member {
     title: &'static str,
 }
 
-const GENSET: Member =
-    Member { id: "genset-1", key: "datakom-d", model: "D-500", unit: 1, title: "Datakom D-500" };
+const GENSET: Member = Member {
+    id: "genset-1",
+    name: "Genset 1",
+    key: "datakom-d",
+    model: "D-500",
+    unit: 1,
+    title: "Datakom D-500",
+};
 
 const ON_THE_LINE: [Member; 3] = [
-    Member { id: "genset-2", key: "datakom-dkg705", model: "DKG-705", unit: 1, title: "Datakom DKG-705" },
+    Member {
+        id: "genset-2",
+        name: "Genset 2",
+        key: "datakom-dkg705",
+        model: "DKG-705",
+        unit: 1,
+        title: "Datakom DKG-705",
+    },
     Member {
         id: "switch-1",
+        name: "Transfer switch",
         key: "smartgen-hat821si",
         model: "HAT821SI",
         unit: 2,
@@ -44,6 +67,7 @@ const ON_THE_LINE: [Member; 3] = [
     },
     Member {
         id: "compressor-1",
+        name: "Compressor",
         key: "smartgen-acc1700",
         model: "ACC1700CAN",
         unit: 3,
@@ -55,6 +79,8 @@ const ON_THE_LINE: [Member; 3] = [
 #[derive(Serialize)]
 struct Shown<'a> {
     page: String,
+    /// Where the imitation is controlled.
+    imitation: Option<String>,
     controllers: Vec<Controller<'a>>,
 }
 
@@ -76,11 +102,15 @@ pub(crate) fn run(args: &args::Demo, json: bool) -> Result<(), Failure> {
         let (Some(tcp), Some(serial)) = (genset.urls().first(), line.urls().first()) else {
             return Err(Failure::Failed("the imitations have no port".to_owned()));
         };
-        let gateway = run::gateway(site(tcp, serial)?, args.listen).await?;
+        let site = site(tcp, serial)?;
+        let beside = imitation(args.listen.unwrap_or(site.listen), &genset, &line)?;
+        let is_controlled = beside.is_some();
+        let gateway = run::gateway(site, args.listen, beside.into_iter().collect()).await?;
         let page = run::page(gateway.address());
+        let imitation = is_controlled.then(|| format!("{page}{IMITATION}/"));
         match json {
-            true => terminal::print_json(&shown(page, tcp, serial))?,
-            false => terminal::print(&told(&page, tcp, serial))?,
+            true => terminal::print_json(&shown(page, imitation, tcp, serial))?,
+            false => terminal::print(&told(&page, imitation.as_deref(), tcp, serial))?,
         }
         stop.wait().await;
         gateway.shutdown().await;
@@ -117,6 +147,25 @@ fn imitated(member: &Member) -> Config {
     }
 }
 
+/// The control of the imitations, to be served beside the page. Others than this machine reach it with a token only, and
+/// without one they do not need it to look at the site.
+fn imitation(listen: SocketAddr, genset: &Emulation, line: &Emulation) -> Result<Option<Beside>, Failure> {
+    let token = control::token()?;
+    if let Err(error) = may_listen(listen, token.as_ref()) {
+        terminal::message(&format!("{error} in {}", control::TOKEN));
+        return Ok(None);
+    }
+    let ids = std::iter::once(&GENSET).chain(&ON_THE_LINE);
+    let controllers = genset.controllers().iter().chain(line.controllers());
+    let imitated = ids.zip(controllers).map(|(member, controller)| Imitated {
+        id: member.id.to_owned(),
+        name: member.name.to_owned(),
+        controller: controller.clone(),
+    });
+    let routes = router(Control { imitated: imitated.collect(), token, site: Some("../".to_owned()) });
+    Ok(Some(Beside { folder: IMITATION.to_owned(), name: "Imitation".to_owned(), routes }))
+}
+
 /// Each controller and where it answers.
 fn members<'a>(
     tcp: &'a Endpoint,
@@ -125,7 +174,7 @@ fn members<'a>(
     std::iter::once((&GENSET, tcp)).chain(ON_THE_LINE.iter().map(move |member| (member, serial)))
 }
 
-fn shown<'a>(page: String, tcp: &'a Endpoint, serial: &'a Endpoint) -> Shown<'a> {
+fn shown<'a>(page: String, imitation: Option<String>, tcp: &'a Endpoint, serial: &'a Endpoint) -> Shown<'a> {
     let controllers = members(tcp, serial).map(|(member, endpoint)| Controller {
         id: member.id,
         profile: member.key,
@@ -133,11 +182,14 @@ fn shown<'a>(page: String, tcp: &'a Endpoint, serial: &'a Endpoint) -> Shown<'a>
         endpoint,
         unit: member.unit,
     });
-    Shown { page, controllers: controllers.collect() }
+    Shown { page, imitation, controllers: controllers.collect() }
 }
 
-fn told(page: &str, tcp: &Endpoint, serial: &Endpoint) -> String {
+fn told(page: &str, imitation: Option<&str>, tcp: &Endpoint, serial: &Endpoint) -> String {
     let mut text = format!("{}\n  page      {page}\n", terminal::style().title("Busbar demonstration site"));
+    if let Some(imitation) = imitation {
+        text += &format!("  switches  {imitation}\n");
+    }
     for (member, endpoint) in members(tcp, serial) {
         let Member { title, unit, .. } = member;
         text += &format!("  imitated  {title:<21}{endpoint}, unit {unit}\n");
@@ -175,7 +227,9 @@ mod tests {
         let site = site(&tcp, &serial).unwrap_or_else(|failure| panic!("{failure:?}"));
         assert!(site.warnings.is_empty(), "{:?}", site.warnings);
         let imitated: Vec<_> = members(&tcp, &serial)
-            .map(|(member, endpoint)| (member.id, member.key, Some(member.model), member.unit, endpoint))
+            .map(|(member, endpoint)| {
+                (member.id, member.name, member.key, Some(member.model), member.unit, endpoint)
+            })
             .collect();
         let polled: Vec<_> = site
             .devices
@@ -184,6 +238,7 @@ mod tests {
                 let endpoint = &site.wires[device.wire].endpoint;
                 (
                     device.id.as_str(),
+                    device.name.as_str(),
                     device.profile.key.as_str(),
                     device.model.as_deref(),
                     device.unit,

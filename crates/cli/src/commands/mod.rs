@@ -1,6 +1,7 @@
 //! One module a command.
 
 mod command;
+mod control;
 mod decode;
 mod demo;
 mod emulate;

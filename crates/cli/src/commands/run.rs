@@ -2,7 +2,7 @@
 
 use std::{net::SocketAddr, path::Path, time::Duration};
 
-use busbar_gateway::{Gateway, Options, Site, StartError};
+use busbar_gateway::{Beside, Gateway, Options, Site, StartError};
 use serde::Serialize;
 use tokio::{
     select,
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &args::Run, json: bool) -> Result<(), Failure> {
     data(args.data.as_deref());
     runtime::service(async |stop| {
         let reloads = Reloads::listen()?;
-        let gateway = gateway(site, args.listen).await?;
+        let gateway = gateway(site, args.listen, Vec::new()).await?;
         let page = page(gateway.address());
         if json {
             terminal::print_json(&Served { page, site: &name, devices })?;
@@ -149,8 +149,13 @@ fn trace<'a>(site: &mut Site, wires: &'a [String]) -> Vec<&'a str> {
     unknown
 }
 
-pub(super) async fn gateway(site: Site, listen: Option<SocketAddr>) -> Result<Gateway, Failure> {
-    busbar_gateway::start(site, Options { listen, ..Options::default() }).await.map_err(|error| match error {
+pub(super) async fn gateway(
+    site: Site,
+    listen: Option<SocketAddr>,
+    beside: Vec<Beside>,
+) -> Result<Gateway, Failure> {
+    let options = Options { listen, beside, ..Options::default() };
+    busbar_gateway::start(site, options).await.map_err(|error| match error {
         StartError::AddressInUse { .. } => Failure::Failed(format!("{error} (--listen ADDR:PORT)")),
         _ => Failure::failed(error),
     })

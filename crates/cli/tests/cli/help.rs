@@ -107,6 +107,11 @@ fn wrong_calls_are_one_sentence_and_status_2() {
         ("emulate datakom-d --listen tcp://127.0.0.1:0 --set fuel_level", "write POINT=VALUE"),
         ("emulate datakom-d --listen tcp://127.0.0.1:0 --set nothing=1", "nothing"),
         ("emulate datakom-d --listen tcp://127.0.0.1:0 --set fuel_level=full", "fuel_level"),
+        (
+            "emulate datakom-d --listen tcp://127.0.0.1:0 --control 192.0.2.1:7000",
+            "does not listen on 192.0.2.1:7000 without a token",
+        ),
+        ("emulate datakom-d --listen tcp://127.0.0.1:0 --control 7000", "write ADDRESS:PORT"),
         ("demo --listen 8080", "write ADDRESS:PORT"),
         ("run", "--config <FILE> is missing"),
         ("run --config site.toml --log xml", "a log is written as text or json"),

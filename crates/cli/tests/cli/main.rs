@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod command;
+mod control;
 mod decode;
 mod frame;
 mod guide;
@@ -15,6 +16,7 @@ mod profile;
 mod pty;
 #[cfg(target_os = "linux")]
 mod run;
+mod scenario;
 #[cfg(target_os = "linux")]
 mod serial;
 mod services;

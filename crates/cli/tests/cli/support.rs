@@ -12,7 +12,10 @@ use serde_json::Value;
 /// The binary under test, without what the surroundings would add.
 pub(crate) fn command() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_busbar"));
-    command.env_remove("NO_COLOR").env_remove("BUSBAR_LOG").stdin(Stdio::null());
+    for name in ["NO_COLOR", "BUSBAR_LOG", "BUSBAR_CONTROL_TOKEN"] {
+        command.env_remove(name);
+    }
+    command.stdin(Stdio::null());
     command
 }
 

@@ -1,22 +1,26 @@
-//! Datakom D-300, D-500 and D-700: keys, modes and the situation the unit is in.
+//! Datakom D-300, D-500 and D-700: the unit with its plant, stepped and written to.
 //!
-//! Power-on finds the unit in AUTO with healthy mains that carry the load. Where the manual is silent this is what
-//! the imitation does:
-//! - one word may press several keys: STOP wins, the others act in the order of their bits; the press length (bits
-//!   14 and 15) and the menu keys change nothing yet;
-//! - TEST runs the genset on load; RUN (MANUAL with RUN on a D-700) runs it off load;
-//! - the rows of bits 1 and 4 and of mode 2 leave the D-300 out: its front has neither MANUAL nor RUN;
-//! - a breaker key works in mode 2 and moves its own breaker: a closed one opens, for an open one the other opens
-//!   first. The genset's is dead until the engine is up to speed;
-//! - STOP cools a running engine down first; STOP again stops it at once;
-//! - a service is due when its hours or its days are used up, and then a warning without a horn;
-//! - a channel above 19 is acknowledged and ignored;
-//! - the hard reset drops every output but the mains breaker and keeps mode and counters.
+//! Power-on finds it in AUTO with healthy mains that carry the load. What the imitation does where the manual is silent
+//! stands in `docs/imitation/datakom-d.md`.
 
 mod alarms;
+mod demand;
+mod display;
+mod identity;
+mod keys;
+mod mains;
+mod operation;
+mod readings;
+mod regulation;
 mod render;
 mod sequence;
+mod service;
+mod settings;
+mod status;
 mod story;
+#[cfg(test)]
+mod transitions;
+mod watch;
 
 use std::time::Duration;
 
@@ -30,9 +34,19 @@ use crate::waveform::Distortion;
 
 use busbar_modbus::ExceptionCode;
 
-use alarms::Alarms;
+use alarms::{Alarms, Breakers};
+use demand::{Causes, Peak};
+use identity::Identity;
+use keys::Menu;
+use mains::Mains;
+use operation::Operation::{MainsBreakerTimer, WaitBeforeFuel};
+use readings::Readings;
+use regulation::Regulation;
 use sequence::{Demand, Sensed, Sequence, Source};
+use service::Service;
+use settings::Settings;
 use story::Scene;
+use watch::{Class, Situation};
 
 const PUSH_BUTTONS: u16 = 8193;
 const CHANNEL_SELECT: u16 = 8194;
@@ -46,8 +60,13 @@ const RESTART: Duration = Duration::from_secs(4);
 #[derive(Clone, Debug)]
 pub(crate) struct DatakomD {
     plant: Plant,
+    settings: Settings,
+    readings: Readings,
+    mains: Mains,
     sequence: Sequence,
+    regulation: Regulation,
     alarms: Alarms,
+    peak: Peak,
     distortion: Distortion,
     random: Random,
     identity: Identity,
@@ -59,15 +78,18 @@ pub(crate) struct DatakomD {
     controls: Controls,
     block_heater: bool,
     fuel_pump: bool,
+    /// How long the pump has been told to run.
+    pumping: Duration,
+    /// Consumers are shed until the load is low enough.
+    shedding: bool,
     channel: u16,
+    menu: Menu,
     story: bool,
     scene: Scene,
     restarting: Duration,
     ethernet_resets: u16,
     packets: u16,
-    /// Days that had passed when the unit was switched on.
-    days_before: f64,
-    hours_at_service: f64,
+    service: Service,
 }
 
 /// Mode codes of register 10605.
@@ -81,39 +103,6 @@ enum Mode {
     Test = 8,
 }
 
-/// Which keys the front has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Front {
-    /// RUN is one key: the mode and the start.
-    Run,
-    /// MANUAL selects the mode and RUN starts, as on a D-700.
-    ManualAndRun,
-    /// None that the manual gives to this model, as on a D-300.
-    Neither,
-}
-
-impl Front {
-    fn of(model: &str) -> Self {
-        match model {
-            "D-300" => Self::Neither,
-            "D-700" => Self::ManualAndRun,
-            _ => Self::Run,
-        }
-    }
-}
-
-/// What makes this unit this unit.
-#[derive(Clone, Debug)]
-struct Identity {
-    /// Register 10609.
-    code: u16,
-    model: String,
-    front: Front,
-    mac: [u8; 6],
-    unique: [u8; 12],
-    imei: [u8; 16],
-}
-
 impl DatakomD {
     /// A unit of the model with this name and identity code.
     pub(crate) fn new(model: &str, code: u16, seed: u64, story: bool) -> Self {
@@ -124,9 +113,14 @@ impl DatakomD {
             plant.tank = Tank::new(24.9);
         }
         let hours = plant.engine.hours;
-        let mut unit = Self {
+        Self {
+            settings: Settings::default(),
+            readings: Readings::of(&plant, 0.0),
+            mains: Mains::good(),
             sequence: Sequence::new((hours / 3.1) as u32),
-            alarms: Alarms::default(),
+            regulation: Regulation::new(&mut plant),
+            alarms: Alarms::new(),
+            peak: Peak::default(),
             distortion: Distortion::new(&mut random),
             identity: Identity::new(model, code, &mut random),
             mode: Mode::Auto,
@@ -135,103 +129,153 @@ impl DatakomD {
             controls: Controls { mains_breaker: true, ..Controls::default() },
             block_heater: false,
             fuel_pump: false,
+            pumping: Duration::ZERO,
+            shedding: false,
             channel: 0,
+            menu: Menu::default(),
             story,
             scene: Scene::NOTHING,
             restarting: Duration::ZERO,
             ethernet_resets: random.between(1.0, 9.0) as u16,
             packets: 0,
-            days_before: random.between(20.0, 90.0),
-            hours_at_service: hours - random.between(20.0, 110.0),
+            service: Service::new(hours, &mut random),
             plant,
             random,
-        };
-        unit.alarms.step(Duration::ZERO, &unit.plant, false);
-        unit
+        }
     }
 
     fn demand(&self) -> Demand {
+        let causes = Causes {
+            settings: &self.settings,
+            mains: &self.mains,
+            mains_usable: self.mains_usable(),
+            remote_start: self.readings.remote_start,
+            exerciser: self.is_exercising(),
+            peak: &self.peak,
+            operation: self.sequence.operation(),
+        };
         match self.mode {
-            Mode::Run => Demand { engine: self.run_wanted, source: self.source },
-            Mode::Test => Demand::ON_LOAD,
-            Mode::Auto if self.scene.exerciser => Demand::ON_LOAD,
-            Mode::Auto | Mode::Stop => Demand::REST,
-        }
-    }
-
-    fn press(&mut self, keys: u16) {
-        let pressed = |bit: u16| keys >> bit & 1 == 1;
-        if pressed(0) {
-            return self.press_stop();
-        }
-        for key in (1..=6).filter(|key| pressed(*key)) {
-            match (key, self.identity.front) {
-                (1, Front::Run) | (4, Front::ManualAndRun) => {
-                    self.enter(Mode::Run);
-                    self.run_wanted = true;
-                }
-                (1, Front::ManualAndRun) => {
-                    // The mode changes, a running engine goes on running.
-                    let running = self.plant.engine.is_running();
-                    self.enter(Mode::Run);
-                    self.run_wanted |= running;
-                }
-                (2, _) => self.enter(Mode::Auto),
-                (3, _) => self.enter(Mode::Test),
-                (5, _) => {
-                    let ready = self.sequence.is_up_to_speed() && self.plant.genset_healthy();
-                    self.press_breaker(Source::Genset, ready);
-                }
-                (6, _) => self.press_breaker(Source::Mains, self.plant.mains_healthy()),
-                _ => {}
+            _ if self.alarms.trip().is_some() => Demand::REST,
+            Mode::Stop => Demand::REST,
+            Mode::Run => {
+                let chosen = Demand { engine: self.run_wanted, source: self.source };
+                let helps = self.settings.emergency_backup && chosen == Demand::OFF_LOAD;
+                causes.backup().filter(|_| helps).unwrap_or(chosen)
             }
+            Mode::Test => Demand::ON_LOAD,
+            Mode::Auto => causes.auto(),
         }
     }
 
-    fn press_stop(&mut self) {
-        if self.mode == Mode::Stop {
-            self.sequence.stop_now();
-        }
-        self.enter(Mode::Stop);
-        self.sequence.acknowledge();
+    /// The mains are good, and their breaker has not refused them.
+    fn mains_usable(&self) -> bool {
+        self.mains.is_healthy() && !self.alarms.mains_breaker_refused()
     }
 
-    fn press_breaker(&mut self, own: Source, ready: bool) {
-        if self.mode != Mode::Run {
-            return;
-        }
-        if self.source == own {
-            self.source = Source::Nothing;
-        } else if ready {
-            self.source = own;
+    /// The story or the weekly schedule wants the genset to be exercised.
+    fn is_exercising(&self) -> bool {
+        let Settings { exerciser_interval: interval, exerciser_duration: duration, .. } = self.settings;
+        let time = self.plant.time;
+        let scheduled = interval > 0.0 && time >= interval && time % interval < duration;
+        self.scene.exerciser || scheduled
+    }
+
+    /// Other gensets on the bus bar are to run with this one.
+    fn calls_others(&self) -> bool {
+        let others = matches!(self.plant.lever("busbar.gensets"), Some(Position::Number(_)));
+        others && (WaitBeforeFuel..=MainsBreakerTimer).contains(&self.sequence.operation())
+    }
+
+    fn genset_healthy(&self) -> bool {
+        self.readings.genset_within(self.settings.genset_voltage, self.settings.genset_frequency)
+    }
+
+    fn sensed(&self) -> Sensed {
+        let (genset_unloaded, mains_unloaded) = regulation::unloaded(&self.plant);
+        Sensed {
+            running: self.readings.running,
+            turning: self.readings.turning,
+            genset_healthy: self.genset_healthy(),
+            mains_healthy: self.mains_usable(),
+            genset_breaker: self.plant.genset_breaker.closed,
+            mains_breaker: self.plant.mains_breaker.closed,
+            in_step: self.regulation.in_step(),
+            genset_unloaded,
+            mains_unloaded,
         }
     }
 
-    fn enter(&mut self, mode: Mode) {
-        if mode != self.mode {
-            self.mode = mode;
-            self.run_wanted = false;
-            self.source = Source::Mains;
+    /// Left of the timer that the unit shows: that of the status, else that of mains which are waited for.
+    fn seconds_left(&self) -> u64 {
+        let waits = self.sequence.operation().is_committed() && self.mode == Mode::Auto;
+        let left = match self.sequence.timer() {
+            Duration::ZERO if waits => self.mains.wait(),
+            timer => timer,
+        };
+        left.as_millis().div_ceil(1000) as u64
+    }
+
+    /// Looks at the plant and judges it.
+    fn look(&mut self, dt: Duration) {
+        self.readings = Readings::of(&self.plant, self.pumping.as_secs_f64());
+        self.mains.step(dt, &self.plant.mains, self.readings.mains_in_order);
+        self.peak.step(dt, &self.readings, &self.settings);
+        let situation = Situation {
+            running: self.readings.running,
+            protected: self.sequence.operation().is_up_to_speed(),
+            parallel: self.readings.side_by_side,
+        };
+        let breakers = Breakers {
+            controls: &self.controls,
+            genset_closed: self.plant.genset_breaker.closed,
+            mains_closed: self.plant.mains_breaker.closed,
+        };
+        self.alarms.step(dt, &self.readings, situation, &breakers, self.sequence.failures);
+        if self.alarms.is_new() {
+            self.menu.show_alarms();
         }
+    }
+
+    /// Moves the sequence on and sets the outputs.
+    fn act(&mut self, dt: Duration) {
+        if let Some(trip) = self.alarms.trip() {
+            self.sequence.trip(trip);
+        }
+        let (demand, sensed) = (self.demand(), self.sensed());
+        self.sequence.step(dt, demand, sensed);
+        self.regulation.step(dt, self.sequence.operation(), &self.settings, &mut self.plant);
+        self.keep_ready(dt);
+        self.controls = Controls {
+            block_heater: self.block_heater,
+            fuel_pump: self.fuel_pump,
+            ..self.sequence.controls(demand, sensed)
+        };
+    }
+
+    /// Switches the heater, the pump and the consumers, each with its hysteresis.
+    fn keep_ready(&mut self, dt: Duration) {
+        let coolant = self.plant.engine.coolant;
+        self.block_heater =
+            !self.plant.engine.firing && (coolant < 38.0 || self.block_heater && coolant < 42.0);
+        let (on, off) = self.settings.fuel_pump;
+        let level = self.readings.fuel_level;
+        self.fuel_pump = level.is_some_and(|level| level < on || self.fuel_pump && level < off);
+        self.pumping = if self.fuel_pump { self.pumping + dt } else { Duration::ZERO };
+        let (add, shed) = self.settings.load_shedding;
+        let load = self.readings.genset_active;
+        self.shedding = load > shed || self.shedding && load > add;
     }
 
     fn restart(&mut self) {
         self.restarting = RESTART;
         self.sequence.restart();
-        self.alarms = Alarms::default();
+        self.sequence.acknowledge();
+        self.alarms.restart();
         self.channel = 0;
+        self.menu = Menu::default();
         self.run_wanted = false;
         self.source = Source::Mains;
         self.ethernet_resets = self.ethernet_resets.wrapping_add(1);
-    }
-
-    /// Switches the heater and the pump, each with its hysteresis.
-    fn keep_ready(&mut self) {
-        let coolant = self.plant.engine.coolant;
-        self.block_heater =
-            !self.plant.engine.firing && (coolant < 38.0 || self.block_heater && coolant < 42.0);
-        let level = self.plant.tank.percent();
-        self.fuel_pump = level < 19.0 || self.fuel_pump && level < 25.0;
     }
 }
 
@@ -250,15 +294,8 @@ impl Panel for DatakomD {
         }
         // The plant first: the status then tells of breakers that have moved, in the same image.
         self.plant.step(seconds, &self.controls);
-        let (demand, sensed) = (self.demand(), Sensed::from(&self.plant));
-        self.sequence.step(dt, demand, sensed);
-        self.keep_ready();
-        self.controls = Controls {
-            block_heater: self.block_heater,
-            fuel_pump: self.fuel_pump,
-            ..self.sequence.controls(demand, sensed)
-        };
-        self.alarms.step(dt, &self.plant, self.sequence.failed_to_start());
+        self.look(dt);
+        self.act(dt);
     }
 
     fn write(&mut self, address: u16, value: u16) {
@@ -291,6 +328,13 @@ impl Panel for DatakomD {
         }
     }
 
+    fn configure(&mut self, settings: &crate::settings::Settings) {
+        self.settings = Settings::of(settings);
+        self.mains.configure(&self.settings.mains);
+        self.sequence.configure(&self.settings);
+        self.alarms.configure(settings);
+    }
+
     fn levers(&self) -> &'static [Lever] {
         plant::LEVERS
     }
@@ -302,49 +346,15 @@ impl Panel for DatakomD {
     fn pull(&mut self, id: &str, to: Position) {
         self.plant.pull(id, to);
     }
-}
 
-impl Identity {
-    fn new(model: &str, code: u16, random: &mut Random) -> Self {
-        let mut bytes = [0; 18];
-        for (byte, word) in bytes.iter_mut().zip(std::iter::repeat_with(|| random.bits())) {
-            *byte = word as u8;
-        }
-        let (mut mac, mut unique) = ([0; 6], [0; 12]);
-        mac.copy_from_slice(&bytes[..6]);
-        unique.copy_from_slice(&bytes[6..]);
-        // Locally administered, so that it is no maker's address.
-        mac[0] = 0x02;
-        Self {
-            code,
-            model: model.to_owned(),
-            front: Front::of(model),
-            mac,
-            unique,
-            imei: imei(random.bits()),
-        }
+    fn inject(&mut self, point: &str, bit: u16, active: bool) -> bool {
+        let class = match point {
+            "shutdown_alarms" => Class::Shutdown,
+            "load_dump_alarms" => Class::LoadDump,
+            "warning_alarms" => Class::Warning,
+            _ => return false,
+        };
+        self.alarms.inject(class, bit, active);
+        true
     }
-}
-
-/// 15 digits under the test prefix 001010 with their Luhn digit, in ASCII, then a zero byte.
-fn imei(mut serial: u64) -> [u8; 16] {
-    let mut digits = [0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
-    for digit in &mut digits[6..14] {
-        *digit = (serial % 10) as u8;
-        serial /= 10;
-    }
-    let sum: u8 = digits[..14]
-        .iter()
-        .enumerate()
-        .map(|(position, digit)| match digit << (position % 2) {
-            doubled @ 10.. => doubled - 9,
-            kept => kept,
-        })
-        .sum();
-    digits[14] = (10 - sum % 10) % 10;
-    let mut text = [0; 16];
-    for (letter, digit) in text.iter_mut().zip(digits) {
-        *letter = b'0' + digit;
-    }
-    text
 }

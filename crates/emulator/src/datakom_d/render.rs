@@ -1,28 +1,24 @@
 //! From the unit to its registers, in the manual's order; the addresses are the manual's.
 
-use busbar_profile::BitSet;
-
 use crate::bank::Bank;
-use crate::lcd::Canvas;
-use crate::plant::{Feed, RATED_KVA, RATED_KW};
+use crate::plant::{Feed, RATED_KVAR, RATED_KW};
 use crate::waveform::{Analysis, Shape};
 
 use super::alarms::SERVICE_1_REQUEST;
-use super::sequence::Operation;
-use super::{DatakomD, Mode};
+use super::status::Shown;
+use super::watch::Class;
+use super::{DatakomD, display, status};
 
-const SHUTDOWN_ALARMS: u16 = 10504;
-const LOAD_DUMP_ALARMS: u16 = 10520;
-const WARNING_ALARMS: u16 = 10536;
+pub(super) const SHUTDOWN_ALARMS: u16 = 10504;
+pub(super) const LOAD_DUMP_ALARMS: u16 = 10520;
+pub(super) const WARNING_ALARMS: u16 = 10536;
 const OPERATION_STATUS: u16 = 10604;
 const UNIT_MODE: u16 = 10605;
 const ETHERNET_PACKETS: u16 = 11683;
-/// Registers of the hours and days left of each service, with the hours and days between two.
-const SERVICES: [([u16; 2], [f64; 2]); 3] =
-    [([10634, 10636], [250.0, 180.0]), ([10638, 10640], [500.0, 365.0]), ([10642, 10644], [1000.0, 730.0])];
-
-/// Above this the oil pressure is there, bar.
-const OIL_PRESSURE_OK: f64 = 1.2;
+/// What an input without a sender reads, ohm.
+const OPEN_CIRCUIT: f64 = 5000.0;
+/// Registers of the hours and days left of each service.
+pub(super) const SERVICES: [[u16; 2]; 3] = [[10634, 10636], [10638, 10640], [10642, 10644]];
 
 /// Stores all of them.
 pub(super) fn registers(unit: &DatakomD, bank: &mut Bank) {
@@ -31,20 +27,19 @@ pub(super) fn registers(unit: &DatakomD, bank: &mut Bank) {
     engine(unit, bank);
     batteries(unit, bank);
     analogs(unit, bank);
-    analysis(unit, bank);
+    let analysis = selected(unit);
+    harmonics(unit, &analysis, bank);
     state(unit, bank);
     counters(unit, bank);
     identity(unit, bank);
     load_share(unit, bank);
     packets(unit, bank);
     // These follow what the counters and then the alarm arrays show, pinned or not.
-    let due = services_due(bank);
+    let due = services_due(unit, bank);
     alarms(unit, due, bank);
     let shown = Shown::of(due, bank);
-    flags(unit, &shown, bank);
-    leds(unit, &shown, bank);
-    inputs_and_outputs(unit, bank);
-    lcd(unit, &shown, bank);
+    status::registers(unit, &shown, bank);
+    display::draw(unit, &shown, &analysis, bank);
 }
 
 /// Stores the Ethernet packet counter alone.
@@ -126,11 +121,16 @@ fn feed(feed: &Feed, at: &FeedRegisters, bank: &mut Bank) {
 }
 
 fn engine(unit: &DatakomD, bank: &mut Bank) {
-    let plant = &unit.plant;
+    let (plant, readings) = (&unit.plant, &unit.readings);
     let engine = &plant.engine;
-    bank.number(10361, engine.oil_pressure);
-    bank.number(10362, engine.coolant);
-    bank.number(10363, plant.tank.percent());
+    let senders = [readings.oil_pressure, readings.temperature, readings.fuel_level];
+    for (address, value) in (10361..).zip(senders) {
+        // An open sender shows what one that is not fitted does.
+        match value {
+            Some(value) => bank.number(address, value),
+            None => bank.absent(address),
+        }
+    }
     bank.number(10364, engine.oil);
     bank.number(10365, plant.canopy);
     bank.number(10366, plant.ambient);
@@ -138,17 +138,9 @@ fn engine(unit: &DatakomD, bank: &mut Bank) {
     for address in 10367..=10372 {
         bank.absent(address);
     }
-    bank.number(10375, engine.speed);
-    bank.number(10376, engine.speed);
-
-    // Governor and regulator stand in the middle of their range and answer the load.
-    let (governor, regulator) = match engine.is_running() {
-        true => (
-            35.0 + 40.0 * plant.genset.total_active() / RATED_KW,
-            48.0 + 20.0 * plant.genset.total_reactive() / RATED_KVA,
-        ),
-        false => (0.0, 0.0),
-    };
+    bank.number(10375, readings.pickup);
+    bank.number(10376, readings.speed);
+    let (governor, regulator) = unit.regulation.outputs();
     bank.number(10607, governor);
     bank.number(10608, regulator);
     bank.number(11680, engine.burn);
@@ -168,15 +160,15 @@ fn batteries(unit: &DatakomD, bank: &mut Bank) {
 
 /// Senders as they are usually fitted: 10-180 ohm for pressure and level, NTC for temperatures.
 fn analogs(unit: &DatakomD, bank: &mut Bank) {
-    let plant = &unit.plant;
+    let (plant, readings) = (&unit.plant, &unit.readings);
     let ntc = |degc: f64| 287.0 * ((40.0 - degc) / 28.0).exp();
     bank.numbers(
         10345,
         1,
         [
-            10.0 + 17.4 * plant.engine.oil_pressure,
-            ntc(plant.engine.coolant),
-            10.0 + 1.7 * plant.tank.percent(),
+            readings.oil_pressure.map_or(OPEN_CIRCUIT, |bar| 10.0 + 17.4 * bar),
+            readings.temperature.map_or(OPEN_CIRCUIT, ntc),
+            readings.fuel_level.map_or(OPEN_CIRCUIT, |percent| 10.0 + 1.7 * percent),
             ntc(plant.engine.oil),
             ntc(plant.canopy),
             ntc(plant.ambient),
@@ -187,13 +179,12 @@ fn analogs(unit: &DatakomD, bank: &mut Bank) {
     bank.absent(10352);
 }
 
-fn analysis(unit: &DatakomD, bank: &mut Bank) {
-    let Analysis { fundamental, harmonics, distortion, trace } = selected(unit);
-    bank.number(10386, distortion);
-    bank.number(10387, fundamental);
-    bank.numbers(10388, 1, harmonics);
+fn harmonics(unit: &DatakomD, analysis: &Analysis, bank: &mut Bank) {
+    bank.number(10386, analysis.distortion);
+    bank.number(10387, analysis.fundamental);
+    bank.numbers(10388, 1, analysis.harmonics);
     bank.code(10403, unit.channel);
-    bank.trace(10404, &trace);
+    bank.trace(10404, &analysis.trace);
 }
 
 /// The channels 0 to 19 of register 8194.
@@ -222,7 +213,7 @@ fn selected(unit: &DatakomD) -> Analysis {
 fn state(unit: &DatakomD, bank: &mut Bank) {
     bank.code(OPERATION_STATUS, unit.sequence.operation() as u16);
     bank.code(UNIT_MODE, unit.mode as u16);
-    bank.integer(10606, unit.sequence.seconds_left() as i64);
+    bank.integer(10606, unit.seconds_left() as i64);
 }
 
 fn counters(unit: &DatakomD, bank: &mut Bank) {
@@ -231,17 +222,15 @@ fn counters(unit: &DatakomD, bank: &mut Bank) {
     bank.integer(10618, unit.sequence.cranks.into());
     bank.integer(10620, unit.sequence.loads.into());
 
-    let hours = plant.engine.hours;
-    let since_service = hours - unit.hours_at_service;
-    let days = unit.days_before + plant.time / 86_400.0;
-    bank.number(10622, hours);
-    bank.number(10624, since_service);
-    bank.number(10626, days);
+    bank.number(10622, plant.engine.hours);
+    let since = unit.service.since(plant.engine.hours, plant.time);
+    bank.numbers(10624, 2, since);
     let energy = &plant.genset_energy;
     bank.numbers(10628, 2, [energy.active, energy.inductive, energy.capacitive]);
-    for ([hours_left, days_left], [interval_hours, interval_days]) in SERVICES {
-        bank.number(hours_left, interval_hours - since_service);
-        bank.number(days_left, interval_days - days);
+    for (left, interval) in SERVICES.into_iter().zip(unit.settings.services) {
+        for ((address, interval), since) in left.into_iter().zip(interval).zip(since) {
+            bank.number(address, interval - since);
+        }
     }
 
     let energy = &plant.mains_energy;
@@ -265,214 +254,37 @@ fn identity(unit: &DatakomD, bank: &mut Bank) {
     bank.bytes(11693, identity.imei.to_vec());
 }
 
-/// One genset alone on its busbar shares with nobody: the totals are its own.
+/// What all gensets on the bus bar carry together, and by how much this one is behind.
 fn load_share(unit: &DatakomD, bank: &mut Bank) {
-    let genset = &unit.plant.genset;
-    bank.number(11175, genset.total_active());
-    bank.number(11177, genset.total_reactive());
-    bank.number(11374, 100.0 * genset.total_active() / RATED_KW);
-    bank.number(11375, 100.0 * genset.total_reactive() / (0.6 * RATED_KVA));
-    bank.number(11376, genset.total_power_factor());
-    bank.number(11377, 0.0);
-    bank.number(11378, 0.0);
+    let (genset, sisters) = (&unit.plant.genset, &unit.plant.sisters);
+    let (own_active, own_reactive) = (genset.total_active(), genset.total_reactive());
+    let (active, reactive) = (own_active + sisters.active(), own_reactive + sisters.reactive());
+    let apparent = active.hypot(reactive);
+    let sets = 1.0 + sisters.on_bus() as f64;
+    bank.number(11175, active);
+    bank.number(11177, reactive);
+    bank.number(11374, 100.0 * active / (sets * RATED_KW));
+    bank.number(11375, 100.0 * reactive / (sets * RATED_KVAR));
+    bank.number(11376, if apparent > 0.0 { active / apparent } else { 0.0 });
+    bank.number(11377, sisters.behind(own_active));
+    bank.number(11378, 100.0 * (reactive / sets - own_reactive) / RATED_KVAR);
 }
 
-fn services_due(bank: &Bank) -> [bool; SERVICES.len()] {
-    let used_up = |register| bank.number_shown(register).is_some_and(|left| left <= 0.0);
-    SERVICES.map(|(left, _)| left.into_iter().any(used_up))
+/// Whose hours or days are used up, and those that somebody has injected.
+fn services_due(unit: &DatakomD, bank: &Bank) -> [bool; SERVICES.len()] {
+    let used_up = |register: u16| bank.number_shown(register).is_some_and(|left| left <= 0.0);
+    let injected = unit.alarms.of(Class::Warning);
+    std::array::from_fn(|service| {
+        SERVICES[service].into_iter().any(used_up) || injected.contains(SERVICE_1_REQUEST + service as u16)
+    })
 }
 
 fn alarms(unit: &DatakomD, due: [bool; SERVICES.len()], bank: &mut Bank) {
-    let mut warning = unit.alarms.warning;
-    for (bit, due) in (SERVICE_1_REQUEST..).zip(due) {
-        warning.set(bit, due);
+    let mut warning = unit.alarms.of(Class::Warning);
+    for (bit, _) in (SERVICE_1_REQUEST..).zip(due).filter(|(_, due)| *due) {
+        warning.insert(bit);
     }
-    bank.bits(SHUTDOWN_ALARMS, unit.alarms.shutdown);
-    bank.bits(LOAD_DUMP_ALARMS, unit.alarms.load_dump);
+    bank.bits(SHUTDOWN_ALARMS, unit.alarms.of(Class::Shutdown));
+    bank.bits(LOAD_DUMP_ALARMS, unit.alarms.of(Class::LoadDump));
     bank.bits(WARNING_ALARMS, warning);
-}
-
-/// Which alarm arrays have a bit set, and which services are due.
-struct Shown {
-    due: [bool; SERVICES.len()],
-    shutdown: bool,
-    load_dump: bool,
-    warning: bool,
-    count: usize,
-}
-
-impl Shown {
-    fn of(due: [bool; SERVICES.len()], bank: &Bank) -> Self {
-        let [shutdown, load_dump, warning] =
-            [SHUTDOWN_ALARMS, LOAD_DUMP_ALARMS, WARNING_ALARMS].map(|array| bank.bits_shown(array).len());
-        Self {
-            due,
-            shutdown: shutdown > 0,
-            load_dump: load_dump > 0,
-            warning: warning > 0,
-            count: shutdown + load_dump + warning,
-        }
-    }
-}
-
-/// The function flags, by the manual's numbers; those not named here stay 0.
-fn flags(unit: &DatakomD, shown: &Shown, bank: &mut Bank) {
-    let set = output_flags(unit).into_iter().chain(state_flags(unit, shown));
-    bank.bits(11555, set.filter(|(_, on)| *on).map(|(flag, _)| flag).collect::<BitSet>());
-}
-
-fn output_flags(unit: &DatakomD) -> impl IntoIterator<Item = (u16, bool)> {
-    use Operation::*;
-    let (plant, controls) = (&unit.plant, &unit.controls);
-    let operation = unit.sequence.operation();
-    let running = plant.engine.is_running();
-    let hot = plant.engine.coolant > 85.0;
-    [
-        (0, controls.fuel),
-        (1, unit.alarms.horn()),
-        (2, controls.starter),
-        (3, matches!(operation, ImmediateStop | Stopping)),
-        (4, controls.genset_breaker),
-        (5, controls.mains_breaker),
-        (6, controls.idle),
-        (7, operation == Preheat),
-        (9, controls.starter),
-        (10, operation == GensetBreakerActivation),
-        (11, plant.genset_breaker.closed && !controls.genset_breaker),
-        (12, controls.genset_breaker),
-        (13, operation == MainsBreakerActivation),
-        (14, plant.mains_breaker.closed && !controls.mains_breaker),
-        (15, controls.mains_breaker),
-        (18, controls.fuel_pump),
-        (20, controls.block_heater),
-        (21, running && hot),
-        (22, controls.block_heater),
-        (23, running && hot),
-        (24, running),
-        (25, running),
-    ]
-}
-
-fn state_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16, bool)> {
-    use Operation::*;
-    let plant = &unit.plant;
-    let operation = unit.sequence.operation();
-    let running = plant.engine.is_running();
-    let genset_healthy = plant.genset_healthy();
-    let tripped = shown.shutdown || shown.load_dump;
-    [
-        (28, running && genset_healthy && !tripped),
-        (36, shown.due[0]),
-        (37, shown.due[1]),
-        (38, shown.due[2]),
-        (41, unit.mode == Mode::Auto && !tripped),
-        (42, unit.scene.exerciser),
-        (43, unit.scene.exerciser && unit.mode == Mode::Auto),
-        (44, !plant.mains_healthy()),
-        (46, running),
-        (47, genset_healthy),
-        (48, running && unit.sequence.is_up_to_speed()),
-        (49, plant.engine.oil_pressure > OIL_PRESSURE_OK),
-        (50, shown.shutdown),
-        (51, shown.load_dump),
-        (52, shown.warning),
-        (53, tripped),
-        (54, tripped || shown.warning),
-        (55, unit.mode == Mode::Test),
-        (56, unit.mode == Mode::Auto),
-        (57, unit.mode == Mode::Run),
-        (58, unit.mode == Mode::Stop),
-        (59, unit.mode != Mode::Auto),
-        (60, operation == AtRest),
-        (61, operation == WaitBeforeFuel),
-        (62, operation == Preheat),
-        (63, operation == WaitOilFlashOff),
-        (64, operation == Heating),
-        (66, matches!(operation, StopWithCooldown | CoolingDown)),
-        (67, matches!(operation, IdleBeforeStop | ImmediateStop | Stopping)),
-        (78, operation == OnLoad),
-        (108, plant.mains_healthy()),
-    ]
-}
-
-/// Two bits a LED. The manual does not say which is which: alarms, then modes, then sources and breakers.
-fn leds(unit: &DatakomD, shown: &Shown, bank: &mut Bank) {
-    const QUICK_FLASH: u8 = 2;
-    let plant = &unit.plant;
-    let on = u8::from;
-    // A breaker on its way flashes.
-    let breaker = |closed: bool, commanded: bool| if closed == commanded { on(closed) } else { QUICK_FLASH };
-    let mut leds = [0; 32];
-    leds[..12].copy_from_slice(&[
-        on(shown.shutdown),
-        on(shown.load_dump),
-        on(shown.warning),
-        on(unit.mode == Mode::Stop),
-        on(unit.mode == Mode::Run),
-        on(unit.mode == Mode::Auto),
-        on(unit.mode == Mode::Test),
-        on(plant.mains_healthy()),
-        breaker(plant.mains_breaker.closed, unit.controls.mains_breaker),
-        breaker(plant.genset_breaker.closed, unit.controls.genset_breaker),
-        on(plant.genset_healthy()),
-        on(plant.engine.is_running()),
-    ]);
-    bank.codes(11160, &leds);
-}
-
-/// Wired as a plain AMF panel: feedbacks come in, relays go out. Extension modules are not fitted.
-fn inputs_and_outputs(unit: &DatakomD, bank: &mut Bank) {
-    let (plant, controls) = (&unit.plant, &unit.controls);
-    let mut inputs = [0; 16];
-    inputs[0] = u8::from(plant.genset_breaker.closed);
-    inputs[1] = u8::from(plant.mains_breaker.closed);
-    inputs[2] = u8::from(controls.fuel_pump);
-    bank.codes(10373, &inputs);
-
-    let outputs = [
-        controls.fuel,
-        controls.starter,
-        controls.genset_breaker,
-        controls.mains_breaker,
-        unit.alarms.horn(),
-        unit.sequence.operation() == Operation::Preheat,
-        controls.block_heater,
-        controls.fuel_pump,
-    ];
-    let outputs = (0..).zip(outputs).filter(|(_, on)| *on).map(|(bit, _)| bit);
-    bank.bits(11164, outputs.collect());
-    bank.bits(11167, BitSet::EMPTY);
-}
-
-fn lcd(unit: &DatakomD, shown: &Shown, bank: &mut Bank) {
-    let plant = &unit.plant;
-    let mut canvas = Canvas::new();
-    let model = unit.identity.model.as_str();
-    let label = |point, code: u8| {
-        let choice = bank.profile().point(point).and_then(|point| point.choice(code.into()));
-        choice.map_or("", |choice| choice.label_for(Some(model)))
-    };
-    canvas.text(0, 0, model);
-    canvas.text_right(0, label("unit_mode", unit.mode as u8));
-    canvas.invert(0);
-    canvas.text(1, 0, label("operation_status", unit.sequence.operation() as u8));
-    if unit.sequence.seconds_left() > 0 {
-        canvas.text_right(2, &format!("{} s", unit.sequence.seconds_left()));
-    }
-    for (line, name, feed) in [(3, "M", &plant.mains), (4, "G", &plant.genset)] {
-        let [l1, l2, l3] = feed.voltage;
-        canvas.text(line, 0, &format!("{name} {l1:3.0} {l2:3.0} {l3:3.0}V"));
-        canvas.text_right(line, &format!("{:4.1}", feed.frequency));
-    }
-    let load = plant.mains.total_active() + plant.genset.total_active();
-    canvas.text(5, 0, &format!("{load:.1} kW  {:.0} rpm", plant.engine.speed));
-    canvas.text(6, 0, &format!("Fuel {:.0}%  Bat {:.1}V", plant.tank.percent(), plant.batteries[0].voltage));
-    match shown.count {
-        0 => canvas.text(7, 0, "No alarms"),
-        count => {
-            canvas.text(7, 0, &format!("Alarms: {count}"));
-            canvas.invert(7);
-        }
-    }
-    bank.bytes(10648, canvas.datakom_bytes());
 }

@@ -1,39 +1,21 @@
 //! The order in which a D-series unit starts, loads, unloads and stops its genset: register 10604 with timer 10606.
 //!
-//! The load changes sides by an open transition: one breaker opens, the timer of the other runs with both open, then
-//! that one is activated until its feedback says closed. Off load (8) and on load (13) last until their breaker has
-//! moved, so that the status always says what carries the load.
+//! With a break one breaker opens, the timer of the other runs with both open, then that one is activated until its
+//! feedback says closed. Without a break the genset is synchronized first, and both are closed for a moment, or for as
+//! long as a soft transfer takes. A status that moves a breaker lasts until that has moved, so that the status always
+//! says what carries the load.
 
 use std::time::Duration;
 
-use crate::plant::{Controls, Plant};
+use crate::plant::Controls;
 
-/// Operation statuses this imitation goes through, with their codes in register 10604. The manual's others need
-/// a second source on the busbar: synchronizing (9, 17), load transfer (10, 18), peak lopping (14), exporting (15),
-/// slave on load (16).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub(super) enum Operation {
-    AtRest = 0,
-    WaitBeforeFuel = 1,
-    Preheat = 2,
-    WaitOilFlashOff = 3,
-    CrankRest = 4,
-    Cranking = 5,
-    IdleSpeed = 6,
-    Heating = 7,
-    OffLoad = 8,
-    GensetBreakerActivation = 11,
-    GensetBreakerTimer = 12,
-    OnLoad = 13,
-    MainsBreakerActivation = 19,
-    MainsBreakerTimer = 20,
-    StopWithCooldown = 21,
-    CoolingDown = 22,
-    IdleBeforeStop = 23,
-    ImmediateStop = 24,
-    Stopping = 25,
-}
+use super::operation::Operation::{self, *};
+use super::settings::Settings;
+
+/// How long a decision to stop is shown.
+const DECISION: Duration = Duration::from_secs(1);
+/// An engine that is to stop at once waits no longer for its breaker than this.
+const BREAKER_PATIENCE: Duration = Duration::from_millis(500);
 
 /// What the unit wants at this moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,10 +28,18 @@ pub(super) struct Demand {
 
 impl Demand {
     pub(super) const REST: Self = Self { engine: false, source: Source::Mains };
+    pub(super) const OFF_LOAD: Self = Self { engine: true, source: Source::Mains };
     pub(super) const ON_LOAD: Self = Self { engine: true, source: Source::Genset };
+    pub(super) const PEAK_LOPPING: Self = Self { engine: true, source: Source::PeakLopping };
+    pub(super) const EXPORTING: Self = Self { engine: true, source: Source::Exporting };
 
     fn on_load(self) -> bool {
         self.engine && self.source == Source::Genset
+    }
+
+    /// Genset and mains together.
+    pub(super) fn parallel(self) -> bool {
+        self.engine && matches!(self.source, Source::PeakLopping | Source::Exporting)
     }
 }
 
@@ -58,43 +48,22 @@ impl Demand {
 pub(super) enum Source {
     Mains,
     Genset,
+    /// Both, the genset whatever is above a limit of the mains.
+    PeakLopping,
+    /// Both, the genset a power of its own.
+    Exporting,
     /// Both breakers are open.
     Nothing,
 }
 
-/// Seconds of the unit's timers. The cool-down is shorter than a real site's, so that it can be watched.
-#[derive(Clone, Debug)]
-struct Timers {
-    wait_before_fuel: u64,
-    preheat: u64,
-    oil_flash_off: u64,
-    crank: u64,
-    crank_rest: u64,
-    idle_speed: u64,
-    heating: u64,
-    breaker: u64,
-    stop_decision: u64,
-    cooldown: u64,
-    idle_before_stop: u64,
-    stop: u64,
-    attempts: u8,
+/// How an alarm takes the genset off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Trip {
+    /// The breaker opens, the engine cools down and stops.
+    LoadDump,
+    /// The breaker opens and the engine stops.
+    Shutdown,
 }
-
-const TIMERS: Timers = Timers {
-    wait_before_fuel: 3,
-    preheat: 3,
-    oil_flash_off: 2,
-    crank: 6,
-    crank_rest: 8,
-    idle_speed: 4,
-    heating: 5,
-    breaker: 2,
-    stop_decision: 1,
-    cooldown: 30,
-    idle_before_stop: 4,
-    stop: 15,
-    attempts: 3,
-};
 
 /// What the sequence sees of the plant.
 #[derive(Clone, Copy, Debug, Default)]
@@ -102,32 +71,43 @@ pub(super) struct Sensed {
     pub(super) running: bool,
     pub(super) turning: bool,
     pub(super) genset_healthy: bool,
+    /// The mains are good, and their breaker obeys.
+    pub(super) mains_healthy: bool,
     pub(super) genset_breaker: bool,
     pub(super) mains_breaker: bool,
+    /// Genset and mains agree in frequency, voltage and angle.
+    pub(super) in_step: bool,
+    /// Next to nothing flows through the breaker.
+    pub(super) genset_unloaded: bool,
+    pub(super) mains_unloaded: bool,
 }
 
-impl From<&Plant> for Sensed {
-    fn from(plant: &Plant) -> Self {
-        Self {
-            running: plant.engine.is_running(),
-            turning: plant.engine.speed > 0.0,
-            genset_healthy: plant.genset_healthy(),
-            genset_breaker: plant.genset_breaker.closed,
-            mains_breaker: plant.mains_breaker.closed,
-        }
-    }
+/// What went wrong on the way; each stays until [`Sequence::acknowledge`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Failures {
+    pub(super) to_start: bool,
+    pub(super) to_stop: bool,
+    pub(super) to_synchronize: bool,
+    /// The mains were to go on feeding beside the genset, so that nothing but a stop is left.
+    pub(super) to_parallel: bool,
 }
 
 /// The state machine; time and the plant are handed in.
 #[derive(Clone, Debug)]
 pub(super) struct Sequence {
+    settings: Settings,
     operation: Operation,
     timer: Duration,
     attempts_left: u8,
-    /// Latched until [`Sequence::acknowledge`].
-    failed_to_start: bool,
-    /// The genset breaker opens for an immediate stop.
-    tripping: bool,
+    /// What a parallel status waited for has come: the breaker that the load has left opens, or the other one closes.
+    ready: bool,
+    /// Genset and mains have met in step, or are about to.
+    in_parallel: bool,
+    /// It could not be synchronized this time: the load moves with a break.
+    unsynchronized: bool,
+    /// The genset breaker opens because of an alarm, since then.
+    tripping: Option<(Trip, Duration)>,
+    pub(super) failures: Failures,
     /// Times the engine ran, since the unit was fitted.
     pub(super) runs: u32,
     /// Times the starter was engaged.
@@ -139,278 +119,364 @@ pub(super) struct Sequence {
 impl Sequence {
     pub(super) fn new(runs: u32) -> Self {
         Self {
-            operation: Operation::AtRest,
+            settings: Settings::default(),
+            operation: AtRest,
             timer: Duration::ZERO,
             attempts_left: 0,
-            failed_to_start: false,
-            tripping: false,
+            ready: false,
+            in_parallel: false,
+            unsynchronized: false,
+            tripping: None,
+            failures: Failures::default(),
             runs,
             cranks: runs + runs / 9,
             loads: runs - runs / 4,
         }
     }
 
+    pub(super) fn configure(&mut self, settings: &Settings) {
+        self.settings = settings.clone();
+    }
+
     pub(super) fn operation(&self) -> Operation {
         self.operation
     }
 
-    /// Whole seconds until the status changes by itself; 0 where it waits for something else.
-    pub(super) fn seconds_left(&self) -> u64 {
-        self.timer.as_millis().div_ceil(1000) as u64
+    /// Left until the status changes by itself; nothing where it waits for something else.
+    pub(super) fn timer(&self) -> Duration {
+        self.timer
     }
 
-    /// Whether the engine has been brought to speed: it can take the load, and its protections are live.
-    pub(super) fn is_up_to_speed(&self) -> bool {
-        (Operation::OffLoad as u8..=Operation::CoolingDown as u8).contains(&(self.operation as u8))
-    }
-
-    pub(super) fn failed_to_start(&self) -> bool {
-        self.failed_to_start
-    }
-
-    /// Forgets the latched failure; a new start is then possible.
+    /// Forgets what went wrong; a new start is then possible.
     pub(super) fn acknowledge(&mut self) {
-        self.failed_to_start = false;
+        self.failures = Failures::default();
     }
 
-    /// Opens the genset breaker and closes the fuel without cooling first.
-    pub(super) fn stop_now(&mut self) {
-        match self.operation {
-            Operation::AtRest | Operation::ImmediateStop | Operation::Stopping => {}
-            Operation::OnLoad => self.tripping = true,
-            _ => self.enter(Operation::ImmediateStop),
+    /// Takes the genset off, as an alarm does for as long as it stands.
+    pub(super) fn trip(&mut self, how: Trip) {
+        if self.operation.carries_load() || self.operation == GensetBreakerActivation {
+            let since = self.tripping.map_or(Duration::ZERO, |(_, since)| since);
+            self.tripping = Some((how, since));
+        } else if how == Trip::Shutdown && self.may_turn() {
+            self.enter(ImmediateStop);
         }
     }
 
-    /// Everything that was under way is forgotten; counters and a latched failure are not.
+    /// Everything that was under way is forgotten; counters and failures are not.
     pub(super) fn restart(&mut self) {
-        self.enter(Operation::AtRest);
+        self.enter(AtRest);
     }
 
     pub(super) fn step(&mut self, dt: Duration, demand: Demand, sensed: Sensed) {
         self.timer = self.timer.saturating_sub(dt);
+        if let Some((_, since)) = &mut self.tripping {
+            *since += dt;
+        }
+        self.ready |= match self.operation {
+            TransferToGenset => sensed.mains_unloaded,
+            TransferToMains => sensed.genset_unloaded,
+            SynchronizingBack => sensed.in_step,
+            _ => false,
+        };
+        self.judge(demand, sensed);
         if let Some(next) = self.next(demand, sensed) {
-            self.failed_to_start |=
-                self.operation == Operation::Cranking && next == Operation::Stopping && demand.engine;
+            let starting = matches!(self.operation, Cranking | IdleSpeed | Heating);
+            self.failures.to_start |= starting && next == Stopping && demand.engine;
             self.enter(next);
         }
     }
 
     /// What the unit's outputs do in this status.
     pub(super) fn controls(&self, demand: Demand, sensed: Sensed) -> Controls {
-        use Operation::*;
-        let to_genset = match self.operation {
-            GensetBreakerActivation => true,
-            OnLoad => demand.on_load() && !self.tripping,
-            _ => false,
-        };
-        let to_mains = match self.operation {
-            OffLoad => !takes_load(demand, sensed),
-            GensetBreakerTimer | GensetBreakerActivation | OnLoad | MainsBreakerTimer => false,
-            _ => true,
-        };
         Controls {
             fuel: !matches!(self.operation, AtRest | WaitBeforeFuel | ImmediateStop | Stopping),
             starter: self.operation == Cranking,
             idle: matches!(self.operation, IdleSpeed | IdleBeforeStop),
-            // The breakers interlock: neither closes while the other's feedback says closed.
-            genset_breaker: to_genset && !sensed.mains_breaker,
-            mains_breaker: to_mains && demand.source != Source::Nothing && !sensed.genset_breaker,
+            genset_breaker: self.tripping.is_none() && self.genset_breaker(demand, sensed),
+            mains_breaker: sensed.mains_healthy && self.mains_breaker(demand, sensed),
             ..Controls::default()
         }
     }
 
-    fn next(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
-        use Operation::*;
-        let wanted = demand.engine;
-        let elapsed = self.timer.is_zero();
-        let after = |next: Operation| elapsed.then_some(next);
+    fn genset_breaker(&self, demand: Demand, sensed: Sensed) -> bool {
+        // Alone it never closes while the mains' feedback says closed.
+        let alone = !sensed.mains_breaker;
         match self.operation {
-            AtRest => (wanted && !self.failed_to_start).then_some(WaitBeforeFuel),
-            WaitBeforeFuel | Preheat | WaitOilFlashOff if !wanted => Some(AtRest),
-            WaitBeforeFuel => after(Preheat),
-            Preheat => after(WaitOilFlashOff),
-            WaitOilFlashOff => after(Cranking),
-            Cranking if sensed.running => Some(IdleSpeed),
-            Cranking | CrankRest if !wanted => Some(Stopping),
-            Cranking if self.attempts_left > 0 => after(CrankRest),
-            Cranking => after(Stopping),
-            CrankRest => after(Cranking),
-            IdleSpeed | Heating | OffLoad if !wanted => Some(StopWithCooldown),
-            IdleSpeed => after(Heating),
-            Heating => after(OffLoad),
-            StopWithCooldown | CoolingDown if wanted => Some(OffLoad),
-            StopWithCooldown => after(CoolingDown),
-            CoolingDown => after(IdleBeforeStop),
-            IdleBeforeStop => after(Stopping),
-            ImmediateStop => after(Stopping),
-            Stopping => (elapsed && !sensed.turning).then_some(AtRest),
-            OffLoad
-            | GensetBreakerTimer
-            | GensetBreakerActivation
-            | OnLoad
-            | MainsBreakerTimer
-            | MainsBreakerActivation => self.next_of_transfer(demand, sensed),
+            GensetBreakerActivation => alone || self.in_parallel,
+            OnLoad | SlaveOnLoad => {
+                let kept = demand.on_load() || self.goes_back_without_break(demand, sensed);
+                kept && (alone || self.in_parallel)
+            }
+            TransferToMains => !self.ready,
+            TransferToGenset | PeakLopping | Exporting | SynchronizingBack => true,
+            _ => false,
         }
     }
 
-    fn next_of_transfer(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
-        use Operation::*;
-        let elapsed = self.timer.is_zero();
-        let unloaded = if demand.engine { OffLoad } else { StopWithCooldown };
-        let away_from_genset = if demand.source == Source::Nothing { unloaded } else { MainsBreakerTimer };
+    fn mains_breaker(&self, demand: Demand, sensed: Sensed) -> bool {
+        // Beside a closed genset breaker it stays closed where the two have met in step, and never closes.
+        let lawful = !sensed.genset_breaker || self.in_parallel && sensed.mains_breaker;
         match self.operation {
-            OffLoad => (takes_load(demand, sensed) && !sensed.mains_breaker).then_some(GensetBreakerTimer),
-            GensetBreakerActivation if sensed.genset_breaker => Some(OnLoad),
-            GensetBreakerTimer | GensetBreakerActivation if !demand.on_load() => Some(away_from_genset),
-            GensetBreakerTimer => elapsed.then_some(GensetBreakerActivation),
-            OnLoad if sensed.genset_breaker => None,
-            OnLoad if self.tripping => Some(ImmediateStop),
-            OnLoad => Some(away_from_genset),
-            MainsBreakerActivation if sensed.mains_breaker => Some(unloaded),
-            MainsBreakerTimer | MainsBreakerActivation if demand.on_load() => Some(GensetBreakerTimer),
-            MainsBreakerTimer | MainsBreakerActivation if demand.source == Source::Nothing => Some(unloaded),
-            MainsBreakerTimer => elapsed.then_some(MainsBreakerActivation),
+            OffLoad => {
+                let leaves = demand.on_load() && sensed.genset_healthy && !self.without_break(sensed);
+                !leaves && demand.source != Source::Nothing && lawful
+            }
+            GensetBreakerActivation => self.in_parallel,
+            TransferToGenset => !self.ready,
+            SynchronizingBack => self.ready,
+            Synchronizing | PeakLopping | Exporting | TransferToMains => true,
+            GensetBreakerTimer | OnLoad | SlaveOnLoad | MainsBreakerTimer => false,
+            _ => demand.source != Source::Nothing && lawful,
+        }
+    }
+
+    /// Notes what has gone wrong.
+    fn judge(&mut self, demand: Demand, sensed: Sensed) {
+        let late = self.timer.is_zero();
+        self.failures.to_stop |= self.operation == Stopping && late && sensed.turning;
+        if self.operation.is_synchronizing() && late && !self.ready && !sensed.in_step {
+            self.unsynchronized = true;
+            self.failures.to_synchronize = true;
+            self.failures.to_parallel |= demand.parallel();
+        }
+    }
+
+    fn next(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        if let Some((trip, since)) = self.tripping {
+            let open = !sensed.genset_breaker;
+            return match trip {
+                Trip::Shutdown => (open || since >= BREAKER_PATIENCE).then_some(ImmediateStop),
+                Trip::LoadDump => open.then(|| away(demand, sensed)),
+            };
+        }
+        match self.operation {
+            AtRest | WaitBeforeFuel | Preheat | WaitOilFlashOff | CrankRest | Cranking => {
+                self.next_of_start(demand, sensed)
+            }
+            IdleSpeed | Heating => self.next_of_warming(demand, sensed),
+            OffLoad | Synchronizing | GensetBreakerTimer | GensetBreakerActivation => {
+                self.next_to_genset(demand, sensed)
+            }
+            _ if self.operation.carries_load() => self.next_on_load(demand, sensed),
+            MainsBreakerTimer | MainsBreakerActivation => self.next_to_mains(demand, sensed),
+            _ => self.next_of_stop(demand, sensed),
+        }
+    }
+
+    fn next_of_start(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        match self.operation {
+            AtRest => demand.engine.then_some(WaitBeforeFuel),
+            WaitBeforeFuel | Preheat | WaitOilFlashOff if !demand.engine => Some(AtRest),
+            WaitBeforeFuel => self.after(Preheat),
+            Preheat => self.after(WaitOilFlashOff),
+            WaitOilFlashOff => self.after(Cranking),
+            Cranking if sensed.running => Some(IdleSpeed),
+            _ if !demand.engine => Some(Stopping),
+            Cranking => self.after(self.next_attempt()),
+            _ => self.after(Cranking),
+        }
+    }
+
+    fn next_of_warming(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        match self.operation {
+            _ if !demand.engine => Some(StopWithCooldown),
+            _ if !sensed.running => Some(self.next_attempt()),
+            IdleSpeed => self.after(Heating),
+            _ => self.after(OffLoad),
+        }
+    }
+
+    fn next_to_genset(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        match self.operation {
+            OffLoad if !demand.engine => Some(StopWithCooldown),
+            OffLoad => self.take_load(demand, sensed),
+            Synchronizing if !(demand.on_load() || demand.parallel()) || !sensed.mains_healthy => {
+                Some(unloaded(demand))
+            }
+            Synchronizing if sensed.in_step => Some(GensetBreakerActivation),
+            Synchronizing => self.after(OffLoad),
+            GensetBreakerActivation if sensed.genset_breaker => Some(self.loaded(demand, sensed)),
+            GensetBreakerActivation if self.in_parallel && !sensed.mains_healthy => {
+                Some(if demand.on_load() { GensetBreakerTimer } else { unloaded(demand) })
+            }
+            GensetBreakerActivation if self.in_parallel && demand.parallel() => None,
+            _ if !demand.on_load() => Some(away(demand, sensed)),
+            GensetBreakerTimer => self.after(GensetBreakerActivation),
             _ => None,
         }
     }
 
+    /// In the statuses in which the genset's breaker is closed.
+    fn next_on_load(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        let alone = !sensed.mains_breaker || !sensed.mains_healthy;
+        let returns = !demand.on_load() && !self.ready;
+        match self.operation {
+            TransferToMains if !sensed.genset_breaker => Some(unloaded(demand)),
+            _ if !sensed.genset_breaker => Some(away(demand, sensed)),
+            OnLoad | SlaveOnLoad => (!sensed.mains_breaker && self.goes_back_without_break(demand, sensed))
+                .then_some(SynchronizingBack),
+            SynchronizingBack => self.next_of_synchronizing_back(demand, sensed),
+            // Mains that fail leave the load to the genset.
+            _ if alone => Some(self.on_load()),
+            TransferToGenset if returns => Some(side_by_side(demand)),
+            TransferToMains if demand.on_load() && !self.ready => Some(TransferToGenset),
+            TransferToMains if demand.parallel() && !self.ready => Some(side_by_side(demand)),
+            PeakLopping | Exporting if demand.on_load() => Some(self.loaded(demand, sensed)),
+            PeakLopping | Exporting => Some(side_by_side(demand)).filter(|next| *next != self.operation),
+            _ => None,
+        }
+    }
+
+    fn next_of_synchronizing_back(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        match sensed.mains_breaker {
+            _ if !sensed.mains_healthy => Some(self.on_load()),
+            true if demand.parallel() => Some(side_by_side(demand)),
+            true if demand.on_load() => Some(TransferToGenset),
+            true if self.settings.soft_transfer => Some(TransferToMains),
+            true => Some(unloaded(demand)),
+            false if demand.on_load() => Some(self.on_load()),
+            // The breaker's own time counts for the breaker.
+            false if self.ready => None,
+            false => self.after(self.on_load()),
+        }
+    }
+
+    fn next_to_mains(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        match self.operation {
+            MainsBreakerActivation if sensed.mains_breaker => Some(unloaded(demand)),
+            _ if demand.on_load() => Some(GensetBreakerTimer),
+            _ if demand.source == Source::Nothing || !sensed.mains_healthy => Some(unloaded(demand)),
+            MainsBreakerTimer => self.after(MainsBreakerActivation),
+            _ => None,
+        }
+    }
+
+    fn next_of_stop(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        match self.operation {
+            StopWithCooldown | CoolingDown | IdleBeforeStop if !sensed.running => Some(Stopping),
+            StopWithCooldown | CoolingDown if demand.engine => Some(OffLoad),
+            StopWithCooldown => self.after(CoolingDown),
+            CoolingDown => self.after(IdleBeforeStop),
+            IdleBeforeStop | ImmediateStop => self.after(Stopping),
+            _ => self.after(AtRest).filter(|_| !sensed.turning),
+        }
+    }
+
+    fn after(&self, next: Operation) -> Option<Operation> {
+        self.timer.is_zero().then_some(next)
+    }
+
+    fn next_attempt(&self) -> Operation {
+        if self.attempts_left > 0 { CrankRest } else { Stopping }
+    }
+
+    /// How a genset that runs off load takes what it is to take.
+    fn take_load(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
+        match sensed.mains_breaker {
+            _ if !sensed.genset_healthy => None,
+            true if demand.parallel() && sensed.mains_healthy && !self.unsynchronized => Some(Synchronizing),
+            true if demand.on_load() && self.without_break(sensed) => Some(Synchronizing),
+            // Otherwise the mains breaker opens first.
+            false if demand.on_load() => Some(GensetBreakerTimer),
+            _ => None,
+        }
+    }
+
+    /// What a genset does whose breaker has just closed, or that is to take all from the mains beside it.
+    fn loaded(&self, demand: Demand, sensed: Sensed) -> Operation {
+        match sensed.mains_breaker {
+            true if demand.parallel() => side_by_side(demand),
+            true if self.settings.soft_transfer && sensed.mains_healthy => TransferToGenset,
+            _ => self.on_load(),
+        }
+    }
+
+    fn on_load(&self) -> Operation {
+        if self.settings.slave { SlaveOnLoad } else { OnLoad }
+    }
+
+    /// The load moves without a break: it is set so, the mains are there, and it has not failed this time.
+    fn without_break(&self, sensed: Sensed) -> bool {
+        self.settings.no_break_transfer && sensed.mains_healthy && !self.unsynchronized
+    }
+
+    fn goes_back_without_break(&self, demand: Demand, sensed: Sensed) -> bool {
+        let home = demand.source == Source::Mains && self.without_break(sensed);
+        home || demand.parallel() && sensed.mains_healthy && !self.unsynchronized
+    }
+
+    /// The engine turns, or has been cranked.
+    fn may_turn(&self) -> bool {
+        !matches!(
+            self.operation,
+            AtRest | WaitBeforeFuel | Preheat | WaitOilFlashOff | ImmediateStop | Stopping
+        )
+    }
+
     fn enter(&mut self, next: Operation) {
-        use Operation::*;
+        let before = self.operation;
         match next {
-            WaitBeforeFuel => self.attempts_left = TIMERS.attempts,
+            WaitBeforeFuel => self.attempts_left = self.settings.start_attempts,
             Cranking => {
                 self.attempts_left = self.attempts_left.saturating_sub(1);
                 self.cranks += 1;
             }
             IdleSpeed => self.runs += 1,
-            OnLoad => self.loads += 1,
+            AtRest => self.unsynchronized = false,
+            _ if before == GensetBreakerActivation && next.carries_load() => self.loads += 1,
             _ => {}
         }
+        self.in_parallel = match next {
+            GensetBreakerActivation => before == Synchronizing,
+            OnLoad | SlaveOnLoad | OffLoad | StopWithCooldown | ImmediateStop => self.in_parallel,
+            _ => next.carries_load(),
+        };
         self.operation = next;
-        self.tripping = false;
-        self.timer = Duration::from_secs(match next {
-            AtRest | OffLoad | OnLoad | GensetBreakerActivation | MainsBreakerActivation => 0,
-            WaitBeforeFuel => TIMERS.wait_before_fuel,
-            Preheat => TIMERS.preheat,
-            WaitOilFlashOff => TIMERS.oil_flash_off,
-            CrankRest => TIMERS.crank_rest,
-            Cranking => TIMERS.crank,
-            IdleSpeed => TIMERS.idle_speed,
-            Heating => TIMERS.heating,
-            GensetBreakerTimer | MainsBreakerTimer => TIMERS.breaker,
-            StopWithCooldown | ImmediateStop => TIMERS.stop_decision,
-            CoolingDown => TIMERS.cooldown,
-            IdleBeforeStop => TIMERS.idle_before_stop,
-            Stopping => TIMERS.stop,
-        });
+        self.tripping = None;
+        self.ready = false;
+        let settings = &self.settings;
+        self.timer = match next {
+            WaitBeforeFuel => settings.start_delay,
+            Preheat => settings.preheat,
+            WaitOilFlashOff => settings.oil_flash_off,
+            CrankRest => settings.crank_rest,
+            Cranking => settings.crank,
+            IdleSpeed => settings.idle,
+            Heating => settings.heating,
+            Synchronizing | SynchronizingBack => settings.synchronizing,
+            GensetBreakerActivation | MainsBreakerActivation => settings.breaker_fail,
+            GensetBreakerTimer => settings.genset_breaker,
+            MainsBreakerTimer => settings.mains_breaker,
+            StopWithCooldown | ImmediateStop => DECISION,
+            CoolingDown => settings.cooldown,
+            IdleBeforeStop => settings.stop_idle,
+            Stopping => settings.stop,
+            _ => Duration::ZERO,
+        };
     }
 }
 
-/// Whether a genset that runs off load is to take the load, and can.
-fn takes_load(demand: Demand, sensed: Sensed) -> bool {
-    demand.on_load() && sensed.genset_healthy
+/// What a running engine does without load.
+fn unloaded(demand: Demand) -> Operation {
+    if demand.engine { OffLoad } else { StopWithCooldown }
+}
+
+/// Where a genset goes whose breaker is open: the mains take over after their timer, if they can and are to.
+fn away(demand: Demand, sensed: Sensed) -> Operation {
+    match sensed.mains_breaker || !sensed.mains_healthy || demand.source == Source::Nothing {
+        true => unloaded(demand),
+        false => MainsBreakerTimer,
+    }
+}
+
+/// What a genset beside the mains is for; where it is for nothing its load goes back.
+fn side_by_side(demand: Demand) -> Operation {
+    match demand.source {
+        Source::PeakLopping if demand.engine => PeakLopping,
+        Source::Exporting if demand.engine => Exporting,
+        _ => TransferToMains,
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const OFF_LOAD: Demand = Demand { engine: true, source: Source::Mains };
-
-    const TENTH: Duration = Duration::from_millis(100);
-
-    /// Steps until the status changes; the new one and the seconds it took.
-    fn until_change(sequence: &mut Sequence, demand: Demand, sensed: Sensed) -> (Operation, f64) {
-        let before = sequence.operation();
-        for tenth in 1..1000 {
-            sequence.step(TENTH, demand, sensed);
-            if sequence.operation() != before {
-                return (sequence.operation(), f64::from(tenth) / 10.0);
-            }
-        }
-        panic!("{before:?} never ended");
-    }
-
-    #[test]
-    fn three_attempts_then_fail_to_start_until_acknowledged() {
-        let mut sequence = Sequence::new(100);
-        let dead = Sensed::default();
-        let mut walk = Vec::new();
-        while walk.last() != Some(&Operation::AtRest) {
-            walk.push(until_change(&mut sequence, OFF_LOAD, dead).0);
-        }
-        use Operation::*;
-        assert_eq!(
-            walk,
-            [
-                WaitBeforeFuel,
-                Preheat,
-                WaitOilFlashOff,
-                Cranking,
-                CrankRest,
-                Cranking,
-                CrankRest,
-                Cranking,
-                Stopping,
-                AtRest
-            ]
-        );
-        assert!(sequence.failed_to_start());
-        assert_eq!((sequence.runs, sequence.cranks), (100, 114));
-
-        sequence.step(TENTH, OFF_LOAD, dead);
-        assert_eq!(sequence.operation(), AtRest, "a latched failure keeps it at rest");
-        sequence.acknowledge();
-        sequence.step(TENTH, OFF_LOAD, dead);
-        assert_eq!(sequence.operation(), WaitBeforeFuel);
-    }
-
-    #[test]
-    fn the_timer_counts_down_to_the_change() {
-        let mut sequence = Sequence::new(1);
-        sequence.step(TENTH, OFF_LOAD, Sensed::default());
-        let mut seen = vec![sequence.seconds_left()];
-        while sequence.operation() == Operation::WaitBeforeFuel {
-            sequence.step(TENTH, OFF_LOAD, Sensed::default());
-            if sequence.operation() == Operation::WaitBeforeFuel
-                && seen.last() != Some(&sequence.seconds_left())
-            {
-                seen.push(sequence.seconds_left());
-            }
-        }
-        assert_eq!(seen, [3, 2, 1]);
-    }
-
-    #[test]
-    fn a_start_that_is_no_longer_wanted_ends_before_cranking() {
-        let mut sequence = Sequence::new(1);
-        sequence.step(TENTH, Demand::ON_LOAD, Sensed::default());
-        sequence.step(TENTH, Demand::REST, Sensed::default());
-        assert_eq!(sequence.operation(), Operation::AtRest);
-        assert!(!sequence.failed_to_start());
-    }
-
-    #[test]
-    fn the_breakers_are_never_commanded_closed_together() {
-        use Operation::*;
-        for operation in
-            [AtRest, OffLoad, GensetBreakerActivation, OnLoad, MainsBreakerActivation, ImmediateStop]
-        {
-            for (genset_breaker, mains_breaker) in
-                [(false, false), (false, true), (true, false), (true, true)]
-            {
-                let mut sequence = Sequence::new(1);
-                sequence.enter(operation);
-                let sensed =
-                    Sensed { genset_breaker, mains_breaker, genset_healthy: true, ..Sensed::default() };
-                for demand in [Demand::REST, OFF_LOAD, Demand::ON_LOAD] {
-                    let controls = sequence.controls(demand, sensed);
-                    assert!(!(controls.genset_breaker && controls.mains_breaker));
-                    assert!(!(controls.genset_breaker && mains_breaker), "{operation:?} {demand:?}");
-                    assert!(!(controls.mains_breaker && genset_breaker), "{operation:?} {demand:?}");
-                }
-            }
-        }
-    }
-}
+mod tests;

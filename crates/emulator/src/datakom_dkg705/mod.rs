@@ -225,7 +225,9 @@ impl Panel for DatakomDkg705 {
     fn step(&mut self, dt: Duration) {
         let seconds = dt.as_secs_f64();
         self.scene = if self.story { Scene::at(self.plant.time) } else { Scene::NOTHING };
-        self.plant.fail_mains(self.scene.mains_failed);
+        if self.story {
+            self.plant.fail_mains(self.scene.mains_failed);
+        }
         self.plant.tank.other_draw = self.scene.fuel_draw;
 
         // The plant first: the status then tells of contactors that have moved, in the same image.

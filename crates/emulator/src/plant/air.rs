@@ -15,6 +15,48 @@ const BUILT_IN_PRESSURE: f64 = 250.0;
 /// Polytropic exponent of air in an oil-flooded screw.
 const EXPONENT: f64 = 1.35;
 const EFFICIENCY: f64 = 0.8;
+/// kW of drag at rated speed, and with bearings that bind.
+const DRAG: f64 = 8.0;
+const BINDING_DRAG: f64 = 36.0;
+/// m3/min that a leak lets out at the pressure of the tools, and that pressure in kPa.
+const LEAK: f64 = 2.5;
+const TOOLS: f64 = 500.0;
+/// Part of its air that a clogged filter lets through.
+const CLOGGED_FILTER: f64 = 0.78;
+/// Times as much is lost across a clogged separator.
+const CLOGGED_SEPARATOR: f64 = 5.0;
+/// Times as warm the oil comes back from a blocked cooler.
+const BLOCKED_COOLER: f64 = 2.2;
+
+/// What the panel does to the air.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Valves {
+    /// The screw's intake is open.
+    pub(super) intake: bool,
+    /// The receiver is vented.
+    pub(super) blow_down: bool,
+}
+
+/// Where the intake valve is stuck.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Intake {
+    #[default]
+    Free,
+    Open,
+    Shut,
+}
+
+/// What is worn or broken.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Wear {
+    pub(super) intake: Intake,
+    pub(super) blow_down_blocked: bool,
+    pub(super) receiver_leaks: bool,
+    pub(super) filter_clogged: bool,
+    pub(super) separator_clogged: bool,
+    pub(super) cooler_blocked: bool,
+    pub(super) screw_binds: bool,
+}
 
 /// What stands behind the intake valve.
 #[derive(Clone, Debug)]
@@ -29,7 +71,8 @@ pub(crate) struct Air {
     pub(crate) delivery: f64,
     /// m3/min of free air to the site.
     pub(crate) consumption: f64,
-    consumers: Consumers,
+    pub(super) wear: Wear,
+    pub(super) consumers: Consumers,
     /// kPa lost across the separator at rated delivery: it clogs over the months.
     separator: f64,
 }
@@ -42,58 +85,66 @@ impl Air {
             separator_loss: 0.0,
             delivery: 0.0,
             consumption: 0.0,
+            wear: Wear::default(),
             consumers: Consumers::new(random),
             separator: random.between(22.0, 38.0),
         }
     }
 
     /// `speed` is a part of the rated one.
-    pub(crate) fn step(
-        &mut self,
-        dt: f64,
-        speed: f64,
-        intake: bool,
-        blow_down: bool,
-        ambient: f64,
-        random: &mut Random,
-    ) {
+    pub(super) fn step(&mut self, dt: f64, speed: f64, valves: Valves, ambient: f64, random: &mut Random) {
         let demand = self.consumers.step(dt, random);
         // Tools get what they want down to some pressure, and less below it.
-        self.consumption = demand * (self.pressure / 500.0).min(1.0);
-        let vented = if blow_down { 0.08 * self.pressure } else { 0.0 };
+        self.consumption = demand * (self.pressure / TOOLS).min(1.0);
+        let leak = if self.wear.receiver_leaks { LEAK * self.pressure / TOOLS } else { 0.0 };
+        let vents = valves.blow_down && !self.wear.blow_down_blocked;
+        let vented = if vents { 0.08 * self.pressure } else { 0.0 };
         let relieved = 2.0 * (self.pressure - SAFETY_VALVE).max(0.0);
 
-        // The intake opens slowly and a spring shuts it at once.
+        let open = match self.wear.intake {
+            Intake::Free => valves.intake,
+            Intake::Open => true,
+            Intake::Shut => false,
+        };
+        let filter = if self.wear.filter_clogged { CLOGGED_FILTER } else { 1.0 };
         let slip = 1.0 - 0.00006 * self.pressure;
-        match intake {
-            true => approach(&mut self.delivery, RATED_DELIVERY * speed * slip, 0.8, dt),
+        // The intake opens slowly and a spring shuts it at once.
+        match open {
+            true => approach(&mut self.delivery, RATED_DELIVERY * speed * slip * filter, 0.8, dt),
             false => self.delivery = 0.0,
         }
-        let filling = (self.delivery - self.consumption) / 60.0 * ATMOSPHERE / RECEIVER;
+        let filling = (self.delivery - self.consumption - leak) / 60.0 * ATMOSPHERE / RECEIVER;
         self.pressure = (self.pressure + (filling - vented - relieved) * dt).max(0.0);
 
         let flow = self.delivery / RATED_DELIVERY;
-        approach(&mut self.separator_loss, self.separator * flow * flow, 0.5, dt);
+        let clogged = if self.wear.separator_clogged { CLOGGED_SEPARATOR } else { 1.0 };
+        approach(&mut self.separator_loss, self.separator * clogged * flow * flow, 0.5, dt);
         let (rise, memory) = match (speed > 0.2, flow > 0.1) {
             (true, true) => (48.0 + 0.03 * self.pressure, 70.0),
             (true, false) => (34.0, 140.0),
             _ => (2.0, 900.0),
         };
-        approach(&mut self.temperature, ambient + rise, memory, dt);
+        let cooler = if self.wear.cooler_blocked && speed > 0.2 { BLOCKED_COOLER } else { 1.0 };
+        approach(&mut self.temperature, ambient + rise * cooler, memory, dt);
     }
 
     /// kW at the shaft: drag, and the work of polytropic compression.
     pub(crate) fn shaft_power(&self, speed: f64) -> f64 {
         let power = (EXPONENT - 1.0) / EXPONENT;
-        let ratio = 1.0 + self.pressure.max(BUILT_IN_PRESSURE) / ATMOSPHERE;
+        // Before the separator stands more than behind it.
+        let behind = self.pressure + self.separator_loss;
+        let ratio = 1.0 + behind.max(BUILT_IN_PRESSURE) / ATMOSPHERE;
         let work = ATMOSPHERE / power * (ratio.powf(power) - 1.0);
-        8.0 * speed * speed + self.delivery / 60.0 * work / EFFICIENCY
+        let drag = if self.wear.screw_binds { BINDING_DRAG } else { DRAG };
+        drag * speed * speed + self.delivery / 60.0 * work / EFFICIENCY
     }
 }
 
 /// Tools that draw all the time, more or less, and one that starts and stops.
 #[derive(Clone, Debug)]
-struct Consumers {
+pub(super) struct Consumers {
+    /// m3/min at which they are held; none where they come and go.
+    pub(super) held: Option<f64>,
     base: Drift,
     blaster_on: bool,
     blaster_switches_in: f64,
@@ -102,6 +153,7 @@ struct Consumers {
 impl Consumers {
     fn new(random: &mut Random) -> Self {
         Self {
+            held: None,
             base: Drift::new(0.6, 40.0, random),
             blaster_on: false,
             blaster_switches_in: random.between(15.0, 40.0),
@@ -116,7 +168,8 @@ impl Consumers {
             self.blaster_switches_in = random.between(15.0, 45.0);
         }
         let blaster = if self.blaster_on { 2.6 } else { 0.0 };
-        4.4 + blaster + self.base.step(dt, random)
+        let wanted = 4.4 + blaster + self.base.step(dt, random);
+        self.held.unwrap_or(wanted)
     }
 }
 
@@ -127,7 +180,7 @@ mod tests {
     fn run(air: &mut Air, speed: f64, intake: bool, blow_down: bool, seconds: u32) -> Vec<f64> {
         let mut random = Random::new(3);
         let steps = (0..10 * seconds).map(|_| {
-            air.step(0.1, speed, intake, blow_down, 20.0, &mut random);
+            air.step(0.1, speed, Valves { intake, blow_down }, 20.0, &mut random);
             air.pressure
         });
         steps.collect()
@@ -172,5 +225,62 @@ mod tests {
         assert!((75.0..105.0).contains(&hot), "{hot}");
         run(&mut air, 0.0, false, true, 60);
         assert!((hot - 10.0..hot).contains(&air.temperature), "{}", air.temperature);
+    }
+
+    #[test]
+    fn a_stuck_intake_fills_the_receiver_or_never_does() {
+        let after = |intake, ordered| {
+            let mut air = Air::new(&mut Random::new(1));
+            air.wear.intake = intake;
+            run(&mut air, 1.0, ordered, false, 120);
+            air.pressure
+        };
+        assert!(after(Intake::Open, false) > 750.0);
+        assert_eq!(after(Intake::Shut, true), 0.0);
+    }
+
+    #[test]
+    fn tools_are_held_a_leak_takes_its_part_and_a_blocked_vent_keeps_the_pressure() {
+        let mut tight = Air::new(&mut Random::new(1));
+        tight.consumers.held = Some(6.0);
+        let mut leaking = tight.clone();
+        leaking.wear.receiver_leaks = true;
+        for air in [&mut tight, &mut leaking] {
+            run(air, 0.8, true, false, 60);
+        }
+        assert!(leaking.pressure < tight.pressure - 50.0, "{} {}", leaking.pressure, tight.pressure);
+        assert!((tight.consumption - 6.0).abs() < 1e-9);
+
+        tight.consumers.held = Some(0.0);
+        tight.wear.blow_down_blocked = true;
+        let before = tight.pressure;
+        run(&mut tight, 0.0, false, true, 60);
+        assert_eq!(tight.pressure, before);
+    }
+
+    #[test]
+    fn dirt_costs_air_pressure_and_power() {
+        let loaded = |wear| {
+            let mut air = Air { wear, ..Air::new(&mut Random::new(1)) };
+            air.consumers.held = Some(9.0);
+            run(&mut air, 1.0, true, false, 60);
+            air
+        };
+        let clean = loaded(Wear::default());
+        let filter = loaded(Wear { filter_clogged: true, ..Wear::default() });
+        let separator = loaded(Wear { separator_clogged: true, ..Wear::default() });
+        let screw = loaded(Wear { screw_binds: true, ..Wear::default() });
+        assert!(filter.delivery < 0.85 * clean.delivery);
+        assert!(separator.separator_loss > 4.0 * clean.separator_loss);
+        assert!(separator.shaft_power(1.0) > clean.shaft_power(1.0) + 2.0);
+        assert!(screw.shaft_power(1.0) > clean.shaft_power(1.0) + 20.0);
+    }
+
+    #[test]
+    fn a_blocked_cooler_overheats_the_discharge() {
+        let mut air = Air::new(&mut Random::new(1));
+        air.wear.cooler_blocked = true;
+        run(&mut air, 1.0, true, false, 300);
+        assert!((120.0..190.0).contains(&air.temperature), "{}", air.temperature);
     }
 }

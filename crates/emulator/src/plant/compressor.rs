@@ -4,9 +4,13 @@
 
 use crate::random::{Drift, Random, approach};
 
-use super::air::Air;
-use super::exhaust::{Exhaust, ParticleFilter};
-use super::{Battery, Controls, Engine, RATED_KW, RATED_RPM, Tank};
+use super::air::{Air, Valves};
+use super::climate::Climate;
+use super::engine::Inputs;
+use super::exhaust::{Exhaust, Gas, ParticleFilter};
+use super::senders::Senders;
+use super::supplies::Service;
+use super::{Battery, Engine, RATED_KW, RATED_RPM, Readings, Tank};
 
 /// What a panel can do to the compressor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,6 +25,25 @@ pub(crate) struct Orders {
     pub(crate) load_valve: bool,
     /// The receiver is vented.
     pub(crate) blow_down: bool,
+}
+
+/// What the senders behind the screw tell; nothing from a broken one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Discharge {
+    /// kPa above the atmosphere.
+    pub(crate) pressure: Option<f64>,
+    /// degC.
+    pub(crate) temperature: Option<f64>,
+    /// kPa lost across the oil separator.
+    pub(crate) separator_loss: Option<f64>,
+}
+
+/// Which of them are broken.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct DischargeSenders {
+    pub(super) pressure: bool,
+    pub(super) temperature: bool,
+    pub(super) separator: bool,
 }
 
 /// The whole of it; a panel reads the fields and hands back [`Orders`].
@@ -44,7 +67,15 @@ pub(crate) struct Compressor {
     pub(crate) fuel_temperature: f64,
     /// kPa before the injection pump.
     pub(crate) fuel_pressure: f64,
-    weather: Drift,
+    /// The button on the canopy is pressed: without the panel's help neither fuel nor starter has a supply.
+    pub(crate) emergency_stop: bool,
+    /// The door of the canopy is open.
+    pub(crate) door_open: bool,
+    /// The engine's own controller says nothing.
+    pub(crate) ecu_silent: bool,
+    pub(super) senders: Senders,
+    pub(super) discharge_senders: DischargeSenders,
+    pub(super) climate: Climate,
     lift_pump: Drift,
     random: Random,
 }
@@ -52,6 +83,7 @@ pub(crate) struct Compressor {
 impl Compressor {
     pub(crate) fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
+        let climate = Climate::new(&mut random);
         Self {
             time: 0.0,
             engine: Engine::new(&mut random),
@@ -61,11 +93,16 @@ impl Compressor {
             battery: Battery::new(&mut random),
             tank: Tank::new(random.between(70.0, 85.0)),
             refilling: false,
-            ambient: 19.0,
-            intake: 21.0,
-            fuel_temperature: 24.0,
+            ambient: climate.outside(),
+            intake: climate.outside() + 2.0,
+            fuel_temperature: climate.outside() + 3.0,
             fuel_pressure: 0.0,
-            weather: Drift::new(0.4, 600.0, &mut random),
+            emergency_stop: false,
+            door_open: false,
+            ecu_silent: false,
+            senders: Senders::default(),
+            discharge_senders: DischargeSenders::default(),
+            climate,
             lift_pump: Drift::new(4.0, 3.0, &mut random),
             random,
         }
@@ -74,23 +111,50 @@ impl Compressor {
     /// Lets `dt` seconds pass; meant for steps of about a tenth of a second.
     pub(crate) fn step(&mut self, dt: f64, orders: &Orders) {
         self.time += dt;
-        let fuel = orders.fuel && self.tank.litres > 0.0;
-        let controls = Controls { fuel, starter: orders.starter, idle: orders.idle, ..Controls::default() };
-        let power = self.shaft_power();
-        self.engine.step(dt, &controls, power, self.intake, &mut self.random);
+        let powered = !self.emergency_stop;
+        let (fuel, starter) = (orders.fuel && powered, orders.starter && powered);
+        let inputs = Inputs {
+            fuel,
+            fed: self.tank.feeds(),
+            starter: starter.then(|| self.battery.strength()),
+            idle: orders.idle,
+            heater: false,
+            load: self.shaft_power(),
+            ambient: self.intake,
+        };
+        self.engine.step(dt, &inputs, &mut self.random);
         let speed = self.engine.speed / RATED_RPM;
-        self.air.step(dt, speed, orders.load_valve, orders.blow_down, self.ambient, &mut self.random);
+        let valves = Valves { intake: orders.load_valve, blow_down: orders.blow_down };
+        self.air.step(dt, speed, valves, self.ambient, &mut self.random);
 
-        let (running, pull) = (self.engine.is_running(), self.torque() / 100.0);
-        self.exhaust.step(dt, running, pull, speed, self.filter.is_regenerating(), self.intake);
+        let running = self.engine.is_running();
+        let (pull, starved) = (self.torque() / 100.0, self.air.wear.filter_clogged);
+        self.exhaust.step(dt, Gas { running, pull, speed, starved, around: self.intake }, &self.filter);
         self.filter.step(dt, running, &self.exhaust);
         // A small charger on shore supply keeps the battery while the engine rests.
-        self.battery.step(dt, orders.starter, running, true, &mut self.random);
+        self.battery.step(dt, Service { cranking: starter, running, supplied: true }, &mut self.random);
         self.tank.step(dt, self.engine.burn, self.refilling);
         self.climate(dt);
 
         let lift = 370.0 + 20.0 * speed + self.lift_pump.step(dt, &mut self.random);
-        approach(&mut self.fuel_pressure, if fuel { lift } else { 0.0 }, 0.6, dt);
+        let lifted = fuel && self.tank.feeds();
+        approach(&mut self.fuel_pressure, if lifted { lift } else { 0.0 }, 0.6, dt);
+    }
+
+    /// What the senders of the engine tell.
+    pub(crate) fn readings(&self) -> Readings {
+        self.senders.read(&self.engine, &self.tank)
+    }
+
+    /// What the senders behind the screw tell.
+    pub(crate) fn discharge(&self) -> Discharge {
+        let (air, broken) = (&self.air, self.discharge_senders);
+        let unless = |broken: bool, value: f64| (!broken).then_some(value);
+        Discharge {
+            pressure: unless(broken.pressure, air.pressure),
+            temperature: unless(broken.temperature, air.temperature),
+            separator_loss: unless(broken.separator, air.separator_loss),
+        }
     }
 
     /// kW that the screw asks of the engine.
@@ -121,14 +185,12 @@ impl Compressor {
 
     /// Percent in the expansion tank, which hot coolant fills.
     pub(crate) fn coolant_level(&self) -> f64 {
-        (84.0 + 0.12 * (self.engine.coolant - 40.0)).clamp(0.0, 100.0)
+        let full = 84.0 + 0.12 * (self.engine.coolant - 40.0);
+        (full * self.engine.coolant_level).clamp(0.0, 100.0)
     }
 
     fn climate(&mut self, dt: f64) {
-        // Power-on is ten in the morning; the warmest hour is three in the afternoon.
-        let hour = 10.0 + self.time / 3600.0;
-        let day = 4.0 * ((hour - 9.0) / 24.0 * std::f64::consts::TAU).sin();
-        self.ambient = 19.0 + day + self.weather.step(dt, &mut self.random);
+        self.ambient = self.climate.step(dt, self.time, &mut self.random);
         let warmer = 2.0 + 0.15 * (self.engine.coolant - self.ambient).max(0.0);
         approach(&mut self.intake, self.ambient + warmer, 180.0, dt);
         // What the injectors do not burn comes back warm.
@@ -139,6 +201,7 @@ impl Compressor {
 
 #[cfg(test)]
 mod tests {
+    use super::super::COMPRESSOR_LEVERS;
     use super::*;
 
     const RUNNING: Orders =
@@ -194,5 +257,69 @@ mod tests {
         };
         assert_eq!(walk(9), walk(9));
         assert_ne!(walk(9), walk(10));
+    }
+
+    fn pull(plant: &mut Compressor, id: &str, to: &str) {
+        let lever = COMPRESSOR_LEVERS.iter().find(|lever| lever.id == id).unwrap();
+        plant.pull(id, lever.position(to).unwrap());
+    }
+
+    #[test]
+    fn the_emergency_stop_cuts_fuel_and_starter() {
+        let mut plant = started(3);
+        pull(&mut plant, "emergency_stop", "pressed");
+        run(&mut plant, &Orders { starter: true, ..RUNNING }, 20.0);
+        assert_eq!(plant.engine.speed, 0.0);
+        pull(&mut plant, "emergency_stop", "released");
+        run(&mut plant, &Orders { starter: true, ..RUNNING }, 6.0);
+        assert!(plant.engine.firing);
+    }
+
+    #[test]
+    fn a_binding_screw_at_full_pressure_overloads_the_engine() {
+        let mut plant = started(4);
+        pull(&mut plant, "air.consumption", "8");
+        run(&mut plant, &LOADED, 60.0);
+        assert!(plant.load() < 105.0, "{}", plant.load());
+        pull(&mut plant, "screw", "binding");
+        run(&mut plant, &LOADED, 30.0);
+        assert!(plant.load() > 110.0, "{}", plant.load());
+    }
+
+    #[test]
+    fn broken_senders_read_nothing_and_the_machine_goes_on() {
+        let mut plant = started(5);
+        assert_eq!(plant.discharge().pressure, Some(plant.air.pressure));
+        for lever in ["discharge_pressure", "discharge_temperature", "separator", "fuel_level"] {
+            pull(&mut plant, &format!("sender.{lever}"), "broken");
+        }
+        run(&mut plant, &LOADED, 30.0);
+        let discharge = plant.discharge();
+        assert_eq!((discharge.pressure, discharge.temperature, discharge.separator_loss), (None, None, None));
+        assert_eq!(plant.readings().fuel_level, None);
+        assert!(plant.readings().coolant.is_some() && plant.air.pressure > 300.0);
+    }
+
+    #[test]
+    fn a_clogged_air_filter_costs_delivery_and_boost_and_heats_the_exhaust() {
+        let after = |filter| {
+            let mut plant = started(6);
+            pull(&mut plant, "air.consumption", "9");
+            pull(&mut plant, "air_filter", filter);
+            run(&mut plant, &LOADED, 90.0);
+            (plant.air.delivery, plant.exhaust.boost)
+        };
+        let (clean, clogged) = (after("clean"), after("clogged"));
+        assert!(clogged.0 < 0.9 * clean.0 && clogged.1 < 0.8 * clean.1, "{clean:?} {clogged:?}");
+    }
+
+    #[test]
+    fn lost_coolant_shows_in_the_expansion_tank() {
+        let mut plant = started(7);
+        pull(&mut plant, "coolant", "leaking");
+        run(&mut plant, &RUNNING, 120.0);
+        assert!(plant.coolant_level() < 40.0, "{}", plant.coolant_level());
+        pull(&mut plant, "coolant", "normal");
+        assert!(plant.coolant_level() > 80.0);
     }
 }

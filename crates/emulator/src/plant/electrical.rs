@@ -7,6 +7,8 @@ pub(crate) struct Feed {
     pub(crate) voltage: [f64; 3],
     /// Hz.
     pub(crate) frequency: f64,
+    /// The phases follow each other the wrong way round.
+    pub(crate) phase_order_wrong: bool,
     /// kW of each phase, positive towards the load.
     pub(crate) active: [f64; 3],
     /// kvar of each phase, positive where the load is inductive.
@@ -110,7 +112,7 @@ mod tests {
     use super::*;
 
     fn balanced() -> Feed {
-        Feed { voltage: [230.0; 3], frequency: 50.0, active: [8.0; 3], reactive: [6.0; 3] }
+        Feed { voltage: [230.0; 3], frequency: 50.0, active: [8.0; 3], reactive: [6.0; 3], ..Feed::default() }
     }
 
     #[test]

@@ -7,6 +7,27 @@ const BURNS_ABOVE: f64 = 280.0;
 /// Percent of soot at which the filter cleans itself, and at which it has done so.
 const REGENERATE_AT: f64 = 80.0;
 const CLEAN_AT: f64 = 15.0;
+/// Percent of soot at which nothing goes through any more.
+const PLUGGED: f64 = 150.0;
+/// degC that a burner adds: while driving, and while a person sees to it with the engine unloaded.
+const BURNER: f64 = 130.0;
+const BURNER_BY_HAND: f64 = 320.0;
+/// degC that too little air adds at full pull, and part of the boost that is left.
+const STARVED: f64 = 110.0;
+const STARVED_BOOST: f64 = 0.6;
+
+/// What goes through the exhaust.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Gas {
+    pub(super) running: bool,
+    /// Parts of the rated torque and speed.
+    pub(super) pull: f64,
+    pub(super) speed: f64,
+    /// The air filter lets too little in.
+    pub(super) starved: bool,
+    /// degC of the air around.
+    pub(super) around: f64,
+}
 
 #[derive(Clone, Debug)]
 pub(crate) struct Exhaust {
@@ -21,51 +42,79 @@ impl Exhaust {
         Self { temperature, boost: 0.0 }
     }
 
-    /// `pull` and `speed` are parts of the rated torque and speed.
-    pub(crate) fn step(
-        &mut self,
-        dt: f64,
-        running: bool,
-        pull: f64,
-        speed: f64,
-        regenerating: bool,
-        around: f64,
-    ) {
-        let (temperature, memory, boost) = match running {
-            true => (110.0 + 340.0 * pull, 25.0, 135.0 * pull * speed * speed),
-            false => (around, 400.0, 0.0),
+    pub(super) fn step(&mut self, dt: f64, gas: Gas, filter: &ParticleFilter) {
+        let (hotter, boosted) = if gas.starved { (STARVED, STARVED_BOOST) } else { (0.0, 1.0) };
+        let (temperature, memory, boost) = match gas.running {
+            true => (
+                110.0 + (340.0 + hotter) * gas.pull,
+                25.0,
+                135.0 * boosted * gas.pull * gas.speed * gas.speed,
+            ),
+            false => (gas.around, 400.0, 0.0),
         };
-        let burner = if regenerating { 130.0 } else { 0.0 };
-        approach(&mut self.temperature, temperature + burner, memory, dt);
+        approach(&mut self.temperature, temperature + filter.burner(), memory, dt);
         approach(&mut self.boost, boost, 1.5, dt);
     }
+}
+
+/// How a filter is cleaned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Regeneration {
+    /// As soon as it is full and the exhaust is hot.
+    Automatic,
+    /// Not at all: somebody has forbidden it.
+    Inhibited,
+    /// A person has asked for it beside the running engine; until it is done.
+    ByHand,
 }
 
 /// A diesel particle filter.
 #[derive(Clone, Debug)]
 pub(crate) struct ParticleFilter {
     /// Percent of what it should hold at most.
-    soot: f64,
+    pub(super) soot: f64,
+    pub(super) regeneration: Regeneration,
     regenerating: bool,
 }
 
 impl ParticleFilter {
     pub(crate) fn new(soot: f64) -> Self {
-        Self { soot, regenerating: false }
+        Self { soot, regeneration: Regeneration::Automatic, regenerating: false }
     }
 
-    pub(crate) fn step(&mut self, dt: f64, running: bool, exhaust: &Exhaust) {
+    pub(super) fn step(&mut self, dt: f64, running: bool, exhaust: &Exhaust) {
         let hot = exhaust.temperature > BURNS_ABOVE;
-        self.regenerating =
-            running && hot && self.soot > CLEAN_AT && (self.regenerating || self.soot >= REGENERATE_AT);
-        let per_hour = match (running, self.regenerating, hot) {
+        let wanted = match self.regeneration {
+            Regeneration::Automatic => hot && (self.regenerating || self.soot >= REGENERATE_AT),
+            Regeneration::Inhibited => false,
+            Regeneration::ByHand => true,
+        };
+        self.regenerating = running && wanted && self.soot > CLEAN_AT;
+        if self.regeneration == Regeneration::ByHand && self.soot <= CLEAN_AT {
+            self.regeneration = Regeneration::Automatic;
+        }
+        let per_hour = match (running, self.regenerating && hot, hot) {
             (false, ..) => 0.0,
             (_, true, _) => -180.0,
             // A hot exhaust burns part of the soot as it comes.
             (.., true) => 7.0,
             _ => 25.0,
         };
-        self.soot = (self.soot + per_hour * dt / 3600.0).clamp(0.0, 150.0);
+        self.soot = (self.soot + per_hour * dt / 3600.0).clamp(0.0, PLUGGED);
+    }
+
+    /// degC that the burner adds to the exhaust.
+    fn burner(&self) -> f64 {
+        match (self.regenerating, self.regeneration) {
+            (false, _) => 0.0,
+            (true, Regeneration::ByHand) => BURNER_BY_HAND,
+            (true, _) => BURNER,
+        }
+    }
+
+    /// Somebody has forbidden it to clean itself.
+    pub(crate) fn is_inhibited(&self) -> bool {
+        self.regeneration == Regeneration::Inhibited
     }
 
     /// It is full, and burns as soon as the exhaust is hot enough.
@@ -125,5 +174,42 @@ mod tests {
         assert!(filter.is_regenerating());
         filter.step(1.0, false, &Exhaust::new(400.0));
         assert!(!filter.is_regenerating() && filter.soot > 70.0);
+    }
+
+    #[test]
+    fn a_person_cleans_it_at_idle_and_it_is_automatic_again() {
+        let mut filter = ParticleFilter::new(100.0);
+        filter.regeneration = Regeneration::ByHand;
+        let mut exhaust = Exhaust::new(130.0);
+        let idle = Gas { running: true, pull: 0.1, speed: 0.6, ..Gas::default() };
+        filter.step(1.0, true, &exhaust);
+        assert!(filter.is_regenerating() && filter.soot >= 100.0, "the exhaust is still cold");
+        for _ in 0..2400 {
+            exhaust.step(1.0, idle, &filter);
+            filter.step(1.0, true, &exhaust);
+        }
+        assert!(!filter.is_regenerating() && filter.soot < 20.0, "{}", filter.soot);
+        assert_eq!(filter.regeneration, Regeneration::Automatic);
+    }
+
+    #[test]
+    fn one_that_is_inhibited_fills_up_however_hot_it_is() {
+        let mut filter =
+            ParticleFilter { regeneration: Regeneration::Inhibited, ..ParticleFilter::new(90.0) };
+        run(&mut filter, 450.0, 1.0);
+        assert!(filter.is_inhibited() && !filter.is_regenerating());
+        assert!(filter.soot > 95.0 && filter.needs_a_person());
+    }
+
+    #[test]
+    fn an_engine_without_air_runs_hot_and_without_boost() {
+        let after = |starved| {
+            let mut exhaust = Exhaust::new(30.0);
+            let gas = Gas { running: true, pull: 0.9, speed: 1.0, starved, around: 20.0 };
+            (0..300).for_each(|_| exhaust.step(1.0, gas, &ParticleFilter::new(20.0)));
+            exhaust
+        };
+        let (fed, starved) = (after(false), after(true));
+        assert!(starved.temperature > fed.temperature + 60.0 && starved.boost < 0.7 * fed.boost);
     }
 }

@@ -1,27 +1,52 @@
 //! The plant behind a panel: mains, genset, load, breakers, tank and batteries, stepped by a simulated clock.
 //!
-//! The same seed, steps and controls give the same plant to the last bit. What a panel shows must follow from
-//! here: no register has a value of its own that contradicts another.
+//! The same seed, steps, controls and pulled levers give the same plant to the last bit. What a panel shows must follow
+//! from here: no register has a value of its own that contradicts another.
 
 mod air;
+mod alternator;
+mod breaker;
+mod climate;
 mod compressor;
+mod compressor_levers;
 mod electrical;
 mod engine;
+mod engine_levers;
 mod exhaust;
+mod governor;
+mod grid;
 mod levers;
+mod load;
 mod parallel;
+mod senders;
+mod sisters;
 mod supplies;
+#[cfg(test)]
+mod tests;
 
+pub(crate) use breaker::Breaker;
 pub(crate) use compressor::{Compressor, Orders};
+pub(crate) use compressor_levers::COMPRESSOR_LEVERS;
 pub(crate) use electrical::{Energy, Feed};
 pub(crate) use engine::Engine;
+pub(crate) use governor::Regulation;
 pub(crate) use levers::LEVERS;
-pub(crate) use parallel::Regulation;
+pub(crate) use parallel::Synchronism;
+pub(crate) use senders::Readings;
+pub(crate) use sisters::Sisters;
 pub(crate) use supplies::{Battery, Tank};
 
-use crate::random::{Drift, Random, approach};
+use crate::random::{Random, approach};
 
-use parallel::Coupling;
+use alternator::Alternator;
+use climate::Climate;
+use engine::Inputs;
+use governor::Fault;
+use grid::{DEAD_PHASE, Grid};
+use load::{Load, NO_LOAD, PhaseLoads};
+use parallel::{Coupling, Set, live_average};
+use senders::Senders;
+use supplies::Service;
 
 /// Nameplate of the imitated genset: 100 kVA, 230/400 V, 50 Hz, four poles.
 pub(crate) const RATED_KW: f64 = 80.0;
@@ -31,12 +56,11 @@ pub(crate) const RATED_RPM: f64 = 1500.0;
 pub(crate) const RATED_VOLTAGE: f64 = 230.9;
 /// Four poles: two periods a turn.
 pub(crate) const HERTZ_PER_RPM: f64 = 2.0 / 60.0;
-/// Seconds a breaker takes from command to position.
-const BREAKER_SECONDS: f64 = 0.2;
 
-/// kW and kvar of each phase.
-type PhaseLoads = ([f64; 3], [f64; 3]);
-const NO_LOAD: PhaseLoads = ([0.0; 3], [0.0; 3]);
+/// rpm a second at which the grid drags a shaft along.
+const DRAG: f64 = 1500.0;
+/// V of the mains from which the battery charger has its supply.
+const SUPPLY: f64 = 180.0;
 
 /// What a panel can do to the plant.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -71,23 +95,31 @@ pub(crate) struct Plant {
     pub(crate) genset_breaker: Breaker,
     pub(crate) batteries: [Battery; 2],
     pub(crate) tank: Tank,
+    /// Other gensets on the bus bar.
+    pub(crate) sisters: Sisters,
     /// degC.
     pub(crate) ambient: f64,
     /// degC under the canopy.
     pub(crate) canopy: f64,
     /// The set point of the genset's voltage regulator.
     pub(crate) excitation: Regulation,
+    /// The button beside the panel is pressed: without the panel's help neither fuel nor starter has a supply.
+    pub(crate) emergency_stop: bool,
+    /// The site's contact for a remote start is closed.
+    pub(crate) remote_start: bool,
+    senders: Senders,
     coupling: Coupling,
-    utility: Utility,
+    grid: Grid,
     load: Load,
-    alternator: f64,
-    weather: Drift,
+    alternator: Alternator,
+    climate: Climate,
     random: Random,
 }
 
 impl Plant {
     pub(crate) fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
+        let climate = Climate::new(&mut random);
         let mut plant = Self {
             time: 0.0,
             mains: Feed::default(),
@@ -99,14 +131,18 @@ impl Plant {
             genset_breaker: Breaker::new(false),
             batteries: [Battery::new(&mut random), Battery::new(&mut random)],
             tank: Tank::new(random.between(70.0, 85.0)),
-            ambient: 18.0,
-            canopy: 21.0,
+            sisters: Sisters::new(&mut random),
+            ambient: climate.outside(),
+            canopy: climate.outside() + 2.0,
             excitation: Regulation::default(),
+            emergency_stop: false,
+            remote_start: false,
+            senders: Senders::default(),
             coupling: Coupling::default(),
-            utility: Utility::new(&mut random),
+            grid: Grid::new(&mut random),
             load: Load::new(&mut random),
-            alternator: 0.0,
-            weather: Drift::new(0.4, 600.0, &mut random),
+            alternator: Alternator::new(),
+            climate,
             random,
         };
         // One step fills the meters, so that the first image is a whole one.
@@ -118,17 +154,31 @@ impl Plant {
     /// Lets `dt` seconds pass; meant for steps of about a tenth of a second.
     pub(crate) fn step(&mut self, dt: f64, controls: &Controls) {
         self.time += dt;
-        self.climate(dt);
+        self.ambient = self.climate.step(dt, self.time, &mut self.random);
+        let warmer = 2.0 + 0.25 * (self.engine.coolant - self.ambient).max(0.0);
+        approach(&mut self.canopy, self.ambient + warmer, 240.0, dt);
         self.mains_breaker.step(dt, controls.mains_breaker);
         self.genset_breaker.step(dt, controls.genset_breaker);
 
-        let carried = self.genset.total_active();
-        self.engine.step(dt, controls, carried, self.canopy, &mut self.random);
-        self.electricity(dt);
+        let starter = controls.starter && !self.emergency_stop;
+        let inputs = Inputs {
+            fuel: controls.fuel && !self.emergency_stop,
+            fed: self.tank.feeds(),
+            starter: starter.then(|| self.batteries[0].strength()),
+            idle: controls.idle,
+            heater: controls.block_heater,
+            load: self.genset.total_active(),
+            ambient: self.canopy,
+        };
+        let speed = self.engine.speed;
+        self.engine.step(dt, &inputs, &mut self.random);
+        self.electricity(dt, speed);
 
-        let charger = self.mains.average_voltage() > 180.0;
+        let running = self.engine.is_running();
+        let supplied = self.mains.average_voltage() > SUPPLY;
+        let service = Service { cranking: starter, running, supplied };
         for battery in &mut self.batteries {
-            battery.step(dt, controls.starter, self.engine.is_running(), charger, &mut self.random);
+            battery.step(dt, service, &mut self.random);
         }
         self.tank.step(dt, self.engine.burn, controls.fuel_pump);
     }
@@ -137,6 +187,7 @@ impl Plant {
     pub(crate) fn mains_healthy(&self) -> bool {
         self.mains.voltage.iter().all(|volts| (190.0..260.0).contains(volts))
             && (47.0..53.0).contains(&self.mains.frequency)
+            && !self.mains.phase_order_wrong
     }
 
     /// Whether the genset is good enough to feed the load.
@@ -145,14 +196,14 @@ impl Plant {
             && (47.0..53.0).contains(&self.genset.frequency)
     }
 
-    /// Takes the voltage off the grid, or gives it back.
+    /// Switches the line of the grid off, or on again, whatever the lever `mains` says.
     pub(crate) fn fail_mains(&mut self, failed: bool) {
-        self.utility.failed = failed;
+        self.grid.outage = failed;
     }
 
     /// Whether genset and grid feed one busbar.
     pub(crate) fn is_parallel(&self) -> bool {
-        self.mains_breaker.closed && self.genset_breaker.closed && self.utility.is_alive()
+        self.mains_breaker.closed && self.genset_breaker.closed && self.grid.is_alive()
     }
 
     /// By how many degrees the genset leads the mains, -180 to 180; without meaning while one of them is dead.
@@ -160,270 +211,115 @@ impl Plant {
         self.coupling.angle()
     }
 
-    fn climate(&mut self, dt: f64) {
-        // Power-on is ten in the morning; the warmest hour is three in the afternoon.
-        let hour = 10.0 + self.time / 3600.0;
-        let day = 4.0 * ((hour - 9.0) / 24.0 * std::f64::consts::TAU).sin();
-        self.ambient = 19.0 + day + self.weather.step(dt, &mut self.random);
-        let warmer = 2.0 + 0.25 * (self.engine.coolant - self.ambient).max(0.0);
-        approach(&mut self.canopy, self.ambient + warmer, 240.0, dt);
+    /// How the genset stands to the mains.
+    pub(crate) fn synchronism(&self) -> Synchronism {
+        let (mains, genset) = (&self.mains, &self.genset);
+        let (mains_volts, genset_volts) = (mains.average_voltage(), genset.average_voltage());
+        Synchronism {
+            live: mains_volts.min(genset_volts) > alternator::DEAD,
+            angle: self.angle(),
+            slip: genset.frequency - mains.frequency,
+            voltage: genset_volts - mains_volts,
+            same_order: !mains.phase_order_wrong,
+        }
     }
 
-    fn electricity(&mut self, dt: f64) {
-        self.excite(dt);
-        // An alternator that does not turn has no voltage at all, however slowly the regulator forgets.
-        let alternator = if self.engine.speed > 0.0 { self.alternator } else { 0.0 };
+    /// Times since power-on that genset and grid were joined out of step.
+    pub(crate) fn jolts(&self) -> u32 {
+        self.coupling.jolts()
+    }
 
-        let load = self.load.step(dt, &mut self.random);
-        let on_mains = self.mains_breaker.closed && self.utility.is_alive();
-        let on_genset = self.genset_breaker.closed && alternator > 100.0;
-        let (mains_load, genset_load) = match (on_mains, on_genset) {
-            (true, true) => {
-                self.coupling.split(dt, load, &self.mains, &self.engine.governor, &self.excitation)
-            }
-            (true, false) => (load, NO_LOAD),
-            (false, true) => (NO_LOAD, load),
-            (false, false) => (NO_LOAD, NO_LOAD),
-        };
+    /// What the senders tell.
+    pub(crate) fn readings(&self) -> Readings {
+        self.senders.read(&self.engine, &self.tank)
+    }
 
-        let (voltage, frequency) = self.utility.step(dt, mains_load.0.iter().sum(), &mut self.random);
-        self.mains = Feed { voltage, frequency, active: mains_load.0, reactive: mains_load.1 };
-        self.mains_energy.add(&self.mains, dt);
-
-        let parallel = on_mains && on_genset;
-        if parallel {
-            // One busbar has one frequency and one voltage, and the grid is the stronger.
-            self.engine.speed = frequency / HERTZ_PER_RPM;
-            self.alternator = self.mains.average_voltage();
+    /// `speed` is that of the shaft before the engine had its say.
+    fn electricity(&mut self, dt: f64, speed: f64) {
+        self.alternator.step(dt, self.engine.speed, &self.excitation, &self.genset);
+        let (voltage, frequency) = self.grid.step(dt, self.mains.total_active(), &mut self.random);
+        if self.coupling.meet(dt, self.is_parallel(), &self.synchronism()) {
+            self.genset_breaker.trip();
         }
-        let terminals = match parallel {
-            true => voltage,
-            false => [0.9985, 1.0008, 1.0007].map(|part| part * alternator),
-        };
-        let ripple = 0.0006 * alternator;
+        let parallel = self.is_parallel();
+        if parallel {
+            self.drag(dt, speed, voltage, frequency);
+        }
+        let terminals = self.terminals(parallel.then_some(voltage));
+        let (mains_load, genset_load) = self.flows(dt, parallel, (voltage, frequency), terminals);
+
+        let phase_order_wrong = self.grid.is_reversed();
+        self.mains =
+            Feed { voltage, frequency, phase_order_wrong, active: mains_load.0, reactive: mains_load.1 };
+        self.mains_energy.add(&self.mains, dt);
         self.genset = Feed {
-            voltage: terminals.map(|volts| volts + ripple * self.random.noise()),
+            voltage: terminals,
             frequency: self.engine.speed * HERTZ_PER_RPM,
             active: genset_load.0,
             reactive: genset_load.1,
+            ..Feed::default()
         };
         self.genset_energy.add(&self.genset, dt);
-        self.coupling.follow(dt, &self.genset, &self.mains, parallel);
+        self.coupling.follow(dt, &self.genset, self.grid.frequency());
     }
 
-    /// The voltage regulator builds up and holds the voltage of a turning alternator.
-    fn excite(&mut self, dt: f64) {
-        let settled = self.excitation.settles_at(RATED_VOLTAGE, self.genset.total_reactive() / RATED_KVAR);
-        let excited = match self.engine.speed {
-            rpm if rpm > 700.0 => settled * (rpm / (0.95 * RATED_RPM)).min(1.0),
-            rpm => 4.0 * rpm / RATED_RPM,
+    /// One busbar has one frequency and one voltage, and the grid is the stronger.
+    fn drag(&mut self, dt: f64, speed: f64, voltage: [f64; 3], frequency: f64) {
+        let missing = frequency / HERTZ_PER_RPM - speed;
+        self.engine.speed = speed + missing.clamp(-DRAG * dt, DRAG * dt);
+        self.alternator.voltage = live_average(voltage);
+    }
+
+    /// V of each phase at the genset's terminals, with those of the grid where it is on the same busbar.
+    fn terminals(&mut self, grid: Option<[f64; 3]>) -> [f64; 3] {
+        let alternator = self.alternator.voltage;
+        let ripple = 0.0006 * alternator;
+        let mut terminals =
+            [0.9985, 1.0008, 1.0007].map(|part| part * alternator + ripple * self.random.noise());
+        if let Some(grid) = grid {
+            for (own, grid) in terminals.iter_mut().zip(grid).filter(|(_, grid)| *grid >= DEAD_PHASE) {
+                *own = grid;
+            }
+        }
+        terminals
+    }
+
+    /// What the mains and the genset carry.
+    fn flows(
+        &mut self,
+        dt: f64,
+        parallel: bool,
+        grid: ([f64; 3], f64),
+        terminals: [f64; 3],
+    ) -> (PhaseLoads, PhaseLoads) {
+        let on_mains = self.mains_breaker.closed && self.grid.is_alive();
+        let on_genset = self.genset_breaker.closed && self.alternator.voltage > alternator::DEAD;
+        let busbar = match (parallel || on_genset, on_mains) {
+            (true, _) => terminals,
+            (_, true) => grid.0,
+            _ => [0.0; 3],
         };
-        approach(&mut self.alternator, excited, 0.4, dt);
-    }
-}
-
-/// A breaker that follows its command after its operating time.
-#[derive(Clone, Debug)]
-pub(crate) struct Breaker {
-    pub(crate) closed: bool,
-    moving: f64,
-}
-
-impl Breaker {
-    fn new(closed: bool) -> Self {
-        Self { closed, moving: 0.0 }
-    }
-
-    fn step(&mut self, dt: f64, command: bool) {
-        self.moving = if command == self.closed { 0.0 } else { self.moving + dt };
-        if self.moving >= BREAKER_SECONDS {
-            self.closed = command;
-            self.moving = 0.0;
+        let hour = Climate::hour(self.time);
+        let load = self.load.step(dt, hour, busbar, &mut self.random);
+        let shared = self.sisters.share(dt, on_genset && !parallel, load, &mut self.random);
+        match (on_mains, on_genset) {
+            _ if parallel => {
+                let set = Set {
+                    running: self.engine.is_running(),
+                    runaway: self.engine.governor.fault == Fault::RunningAway,
+                    governor: self.engine.governor.set_point(),
+                    excitation: &self.excitation,
+                    avr: self.alternator.avr,
+                };
+                self.coupling.split(dt, load, grid, &set)
+            }
+            (true, _) => (load, NO_LOAD),
+            (_, true) => (NO_LOAD, shared),
+            _ => (NO_LOAD, NO_LOAD),
         }
-    }
-}
-
-/// The public grid at the meter.
-#[derive(Clone, Debug)]
-struct Utility {
-    common: Drift,
-    phases: [Drift; 3],
-    frequency: Drift,
-    failed: bool,
-    /// Part of its voltage that is there.
-    present: f64,
-}
-
-impl Utility {
-    fn new(random: &mut Random) -> Self {
-        Self {
-            common: Drift::new(1.2, 180.0, random),
-            phases: std::array::from_fn(|_| Drift::new(0.5, 15.0, random)),
-            frequency: Drift::new(0.012, 8.0, random),
-            failed: false,
-            present: 1.0,
-        }
-    }
-
-    fn is_alive(&self) -> bool {
-        !self.failed
-    }
-
-    fn step(&mut self, dt: f64, load: f64, random: &mut Random) -> ([f64; 3], f64) {
-        let level = 231.5 + self.common.step(dt, random) - 0.02 * load;
-        let voltage: [f64; 3] = std::array::from_fn(|phase| level + self.phases[phase].step(dt, random));
-        let frequency = 50.0 + self.frequency.step(dt, random);
-        // Motors that run down hold the voltage for some periods.
-        approach(&mut self.present, if self.failed { 0.0 } else { 1.0 }, 0.1, dt);
-        match self.present {
-            0.999.. => (voltage, frequency),
-            // Below this a meter sees neither voltage nor frequency.
-            ..0.02 => ([0.0; 3], 0.0),
-            part => (voltage.map(|volts| volts * part), frequency),
-        }
-    }
-}
-
-/// The consumers: a base that wanders, and a machine that switches on and off.
-#[derive(Clone, Debug)]
-struct Load {
-    base: Drift,
-    power_factor: Drift,
-    shares: [Drift; 3],
-    machine_on: bool,
-    machine_switches_in: f64,
-}
-
-impl Load {
-    fn new(random: &mut Random) -> Self {
-        Self {
-            base: Drift::new(2.5, 90.0, random),
-            power_factor: Drift::new(0.012, 60.0, random),
-            shares: std::array::from_fn(|_| Drift::new(0.008, 120.0, random)),
-            machine_on: false,
-            machine_switches_in: random.between(20.0, 60.0),
-        }
-    }
-
-    /// kW and kvar of each phase, in the tenths that the controllers' meters resolve: totals are then the exact
-    /// sums of what is shown.
-    fn step(&mut self, dt: f64, random: &mut Random) -> PhaseLoads {
-        self.machine_switches_in -= dt;
-        if self.machine_switches_in <= 0.0 {
-            self.machine_on = !self.machine_on;
-            self.machine_switches_in = random.between(40.0, 120.0);
-        }
-        let machine = if self.machine_on { 7.5 } else { 0.0 };
-        let total = 36.0 + machine + self.base.step(dt, random);
-        let power_factor = 0.885 + self.power_factor.step(dt, random);
-        let reactive_part = (1.0 - power_factor * power_factor).sqrt() / power_factor;
-
-        let mut shares = [0.342, 0.331, 0.327];
-        for (share, drift) in shares.iter_mut().zip(&mut self.shares) {
-            *share += drift.step(dt, random);
-        }
-        let whole: f64 = shares.iter().sum();
-        let active = shares.map(|share| tenth(total * share / whole));
-        (active, active.map(|kw| tenth(kw * reactive_part)))
     }
 }
 
 fn past_energy(active: f64) -> Energy {
     Energy { active, exported: 0.0, inductive: active * 0.47, capacitive: active * 0.003 }
-}
-
-fn tenth(value: f64) -> f64 {
-    (value * 10.0).round() / 10.0
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const DT: f64 = 0.1;
-
-    fn run(plant: &mut Plant, controls: &Controls, seconds: f64) {
-        for _ in 0..(seconds / DT) as u32 {
-            plant.step(DT, controls);
-        }
-    }
-
-    fn on_mains() -> Controls {
-        Controls { mains_breaker: true, ..Controls::default() }
-    }
-
-    fn start(plant: &mut Plant) -> Controls {
-        let mut controls = Controls { fuel: true, starter: true, ..on_mains() };
-        run(plant, &controls, 5.0);
-        controls.starter = false;
-        run(plant, &controls, 10.0);
-        controls
-    }
-
-    #[test]
-    fn mains_carry_the_load_from_the_first_image_on() {
-        let plant = Plant::new(1);
-        assert!(plant.mains_healthy());
-        assert!(plant.mains.total_active() > 25.0);
-        assert_eq!(plant.genset.voltage, [0.0; 3]);
-        assert_eq!(plant.time, 0.0);
-    }
-
-    #[test]
-    fn the_same_seed_is_the_same_plant() {
-        let walk = |seed| {
-            let mut plant = Plant::new(seed);
-            run(&mut plant, &on_mains(), 60.0);
-            (plant.mains.voltage, plant.mains_energy.active, plant.engine.coolant)
-        };
-        assert_eq!(walk(9), walk(9));
-        assert_ne!(walk(9), walk(10));
-    }
-
-    #[test]
-    fn a_started_genset_builds_up_voltage_and_takes_the_load() {
-        let mut plant = Plant::new(2);
-        let mut controls = start(&mut plant);
-        assert!(plant.genset_healthy(), "{:?}", plant.genset);
-        assert_eq!(plant.genset.total_active(), 0.0);
-
-        controls.mains_breaker = false;
-        run(&mut plant, &controls, 1.0);
-        assert_eq!(plant.mains.total_active(), 0.0);
-        controls.genset_breaker = true;
-        run(&mut plant, &controls, 5.0);
-        assert!(plant.genset.total_active() > 25.0);
-        assert!(plant.genset_healthy(), "{:?}", plant.genset);
-        assert!(plant.engine.burn > 8.0);
-    }
-
-    #[test]
-    fn a_breaker_takes_its_time() {
-        let mut breaker = Breaker::new(false);
-        breaker.step(0.1, true);
-        assert!(!breaker.closed);
-        breaker.step(0.1, true);
-        assert!(breaker.closed);
-    }
-
-    #[test]
-    fn cranking_dips_the_battery_and_is_remembered() {
-        let mut plant = Plant::new(4);
-        run(&mut plant, &on_mains(), 10.0);
-        let rest = plant.batteries[0].voltage;
-        start(&mut plant);
-        assert!(plant.batteries[0].cranking_minimum < rest - 4.0);
-        assert!(plant.batteries[0].voltage > 27.0, "the alternator charges it again");
-    }
-
-    #[test]
-    fn burned_fuel_leaves_the_tank() {
-        let mut plant = Plant::new(6);
-        let controls = start(&mut plant);
-        let (litres, burned) = (plant.tank.litres, plant.engine.burned);
-        run(&mut plant, &controls, 600.0);
-        let drawn = litres - plant.tank.litres;
-        assert!(drawn > 0.1);
-        assert!((drawn - (plant.engine.burned - burned)).abs() < 1e-6);
-    }
 }

@@ -1,43 +1,72 @@
-//! Genset and grid on one busbar: droop, the angle between the two, and who carries how much.
+//! Genset and grid on one busbar: the angle between the two, how they meet, and who carries how much.
 
 use crate::random::approach;
 
-use super::{Feed, HERTZ_PER_RPM, PhaseLoads, RATED_KVAR, RATED_KW, RATED_RPM, RATED_VOLTAGE, tenth};
+use super::alternator::Avr;
+use super::grid::DEAD_PHASE;
+use super::load::{PhaseLoads, tenth};
+use super::{
+    Feed, HERTZ_PER_RPM, RATED_KVA, RATED_KVAR, RATED_KW, RATED_RPM, RATED_VOLTAGE, Regulation, engine,
+};
 
 /// Seconds in which power follows a governor or a voltage regulator.
 const FOLLOWING: f64 = 0.4;
+/// kW that the grid needs to turn an engine without fuel.
+const MOTORING: f64 = 9.6;
+/// Beyond these two live sources are not joined without a jolt: degrees, Hz, V.
+const ANGLE_WINDOW: f64 = 20.0;
+const SLIP_WINDOW: f64 = 0.6;
+const VOLTAGE_WINDOW: f64 = 25.0;
+/// Seconds of a jolt until the genset breaker's own release has opened it.
+const RELEASE: f64 = 0.2;
+/// Times the rated power that flows between two sources in opposition.
+const SURGE: f64 = 3.0;
 
-/// The set point of a governor (rpm) or a voltage regulator (V).
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Regulation {
-    /// What a controller's analog output adds to it.
-    pub(crate) trim: f64,
-    /// By how much rated load bends it; 0 where it holds whatever the load.
-    pub(crate) droop: f64,
+/// How the genset stands to the mains.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Synchronism {
+    /// Both have a voltage; the rest means little otherwise.
+    pub(crate) live: bool,
+    /// Degrees by which the genset leads, -180 to 180.
+    pub(crate) angle: f64,
+    /// Hz by which the genset is faster.
+    pub(crate) slip: f64,
+    /// V by which its average phase is higher.
+    pub(crate) voltage: f64,
+    /// The phases of both follow each other in one order.
+    pub(crate) same_order: bool,
 }
 
-impl Regulation {
-    /// The speed or voltage at a part of rated load.
-    pub(super) fn settles_at(&self, rated: f64, part: f64) -> f64 {
-        rated + self.trim - self.droop * part
+impl Synchronism {
+    /// Whether a breaker between the two can be closed without a jolt.
+    pub(crate) fn is_safe(&self) -> bool {
+        self.live
+            && self.same_order
+            && self.angle.abs() <= ANGLE_WINDOW
+            && self.slip.abs() <= SLIP_WINDOW
+            && self.voltage.abs() <= VOLTAGE_WINDOW
     }
+}
 
-    /// The part of rated load at which a busbar held by others is met; nothing without droop.
-    fn part_at(&self, rated: f64, held: f64) -> f64 {
-        match self.droop {
-            droop if droop > 0.0 => ((rated + self.trim - held) / droop).clamp(-0.2, 1.1),
-            _ => 0.0,
-        }
-    }
+/// How genset and grid are tied together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Tie {
+    #[default]
+    Apart,
+    /// Out of step: seconds until the release opens.
+    Jolting(f64),
+    Together,
 }
 
 /// What ties the genset to the grid.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Coupling {
+    tie: Tie,
     angle: f64,
     /// kW and kvar of the genset.
     active: f64,
     reactive: f64,
+    jolts: u32,
 }
 
 impl Coupling {
@@ -46,93 +75,113 @@ impl Coupling {
         self.angle
     }
 
+    /// Times the two were joined out of step.
+    pub(super) fn jolts(&self) -> u32 {
+        self.jolts
+    }
+
+    /// Whether they pull at each other out of step.
+    pub(super) fn is_jolting(&self) -> bool {
+        matches!(self.tie, Tie::Jolting(_))
+    }
+
+    /// Joins them, or takes them apart. True when the genset breaker's release opens.
+    pub(super) fn meet(&mut self, dt: f64, joined: bool, synchronism: &Synchronism) -> bool {
+        let mut releases = false;
+        self.tie = match (joined, self.tie) {
+            (false, _) => Tie::Apart,
+            (true, Tie::Apart) if synchronism.is_safe() => Tie::Together,
+            (true, Tie::Apart) => {
+                self.jolts += 1;
+                Tie::Jolting(RELEASE)
+            }
+            (true, Tie::Jolting(left)) if left > 1.5 * dt => Tie::Jolting(left - dt),
+            (true, Tie::Jolting(_)) => {
+                releases = true;
+                Tie::Together
+            }
+            (true, Tie::Together) => Tie::Together,
+        };
+        releases
+    }
+
     /// What the mains and the genset carry of a load when both feed it: the genset what its set points ask for, the
-    /// grid the rest.
+    /// grid the rest. A phase that the grid has lost is all the genset's.
     pub(super) fn split(
         &mut self,
         dt: f64,
         (active, reactive): PhaseLoads,
-        grid: &Feed,
-        governor: &Regulation,
-        excitation: &Regulation,
+        grid: ([f64; 3], f64),
+        genset: &Set<'_>,
     ) -> (PhaseLoads, PhaseLoads) {
-        let kw = RATED_KW * governor.part_at(RATED_RPM, grid.frequency / HERTZ_PER_RPM);
-        let kvar = RATED_KVAR * excitation.part_at(RATED_VOLTAGE, grid.average_voltage());
-        approach(&mut self.active, kw, FOLLOWING, dt);
-        approach(&mut self.reactive, kvar, FOLLOWING, dt);
-        let genset = ([tenth(self.active / 3.0); 3], [tenth(self.reactive / 3.0); 3]);
+        let (volts, hertz) = grid;
+        if self.is_jolting() {
+            let angle = self.angle.to_radians();
+            self.active = SURGE * RATED_KW * angle.sin();
+            self.reactive = SURGE * RATED_KVA * (1.0 - angle.cos()) + 0.5 * RATED_KVAR;
+        } else {
+            approach(&mut self.active, genset.active(hertz), FOLLOWING, dt);
+            approach(&mut self.reactive, genset.reactive(live_average(volts)), FOLLOWING, dt);
+        }
+        let third = (tenth(self.active / 3.0), tenth(self.reactive / 3.0));
+        let part = |whole: [f64; 3], third: f64| -> [f64; 3] {
+            std::array::from_fn(|n| if volts[n] < DEAD_PHASE { whole[n] } else { third })
+        };
+        let own = (part(active, third.0), part(reactive, third.1));
         let rest = |whole: [f64; 3], part: [f64; 3]| std::array::from_fn(|n| tenth(whole[n] - part[n]));
-        ((rest(active, genset.0), rest(reactive, genset.1)), genset)
+        ((rest(active, own.0), rest(reactive, own.1)), own)
     }
 
     /// Lets the two run against each other, and remembers what the genset carries.
-    pub(super) fn follow(&mut self, dt: f64, genset: &Feed, grid: &Feed, parallel: bool) {
-        if parallel {
-            self.angle = 0.0;
-            return;
+    pub(super) fn follow(&mut self, dt: f64, genset: &Feed, grid_frequency: f64) {
+        match self.tie {
+            Tie::Together => self.angle = 0.0,
+            // The stronger drags the other into step.
+            Tie::Jolting(_) => self.angle *= 0.6,
+            Tie::Apart => {
+                (self.active, self.reactive) = (genset.total_active(), genset.total_reactive());
+                let angle = self.angle + 360.0 * (genset.frequency - grid_frequency) * dt;
+                self.angle = (angle + 180.0).rem_euclid(360.0) - 180.0;
+            }
         }
-        (self.active, self.reactive) = (genset.total_active(), genset.total_reactive());
-        let angle = self.angle + 360.0 * (genset.frequency - grid.frequency) * dt;
-        self.angle = (angle + 180.0).rem_euclid(360.0) - 180.0;
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use crate::plant::{Controls, Plant};
+/// What decides how much a genset carries beside the grid.
+pub(super) struct Set<'a> {
+    pub(super) running: bool,
+    pub(super) runaway: bool,
+    pub(super) governor: Regulation,
+    pub(super) excitation: &'a Regulation,
+    pub(super) avr: Avr,
+}
 
-    const DT: f64 = 0.1;
-
-    fn run(plant: &mut Plant, controls: &Controls, seconds: f64) {
-        for _ in 0..(seconds / DT) as u32 {
-            plant.step(DT, controls);
+impl Set<'_> {
+    /// kW at a frequency that the grid holds.
+    fn active(&self, hertz: f64) -> f64 {
+        match (self.running, self.runaway) {
+            (false, _) => -MOTORING,
+            (_, true) => engine::MOST_KW,
+            _ => (RATED_KW * self.governor.part_at(RATED_RPM, hertz / HERTZ_PER_RPM)).max(-MOTORING),
         }
     }
 
-    fn paralleled() -> (Plant, Controls) {
-        let mut plant = Plant::new(3);
-        plant.engine.governor.droop = 60.0;
-        plant.excitation.droop = 9.0;
-        let mut controls = Controls { fuel: true, starter: true, mains_breaker: true, ..Controls::default() };
-        run(&mut plant, &controls, 5.0);
-        controls.starter = false;
-        run(&mut plant, &controls, 10.0);
-        controls.genset_breaker = true;
-        run(&mut plant, &controls, 2.0);
-        (plant, controls)
+    /// kvar at a voltage that the grid holds.
+    fn reactive(&self, volts: f64) -> f64 {
+        match self.avr {
+            // Without a field of its own it takes it from the grid.
+            Avr::Failed => -0.7 * RATED_KVAR,
+            Avr::High => 1.5 * RATED_KVAR,
+            Avr::Normal => RATED_KVAR * self.excitation.part_at(RATED_VOLTAGE, volts),
+        }
     }
+}
 
-    #[test]
-    fn in_parallel_the_governor_chooses_the_power_and_the_grid_the_frequency() {
-        let (mut plant, controls) = paralleled();
-        assert!(plant.genset.total_active().abs() < 4.0, "{:?}", plant.genset);
-        plant.engine.governor.trim = 15.0;
-        run(&mut plant, &controls, 5.0);
-        let genset = plant.genset.total_active();
-        assert!((16.0..24.0).contains(&genset), "{genset}");
-        assert!(plant.mains.total_active() > 5.0);
-        assert!((plant.genset.frequency - plant.mains.frequency).abs() < 1e-9);
-        assert_eq!(plant.angle(), 0.0);
-    }
-
-    #[test]
-    fn the_genset_goes_on_alone_where_it_was_when_the_grid_leaves() {
-        let (mut plant, mut controls) = paralleled();
-        plant.engine.governor.trim = 30.0;
-        run(&mut plant, &controls, 5.0);
-        plant.fail_mains(true);
-        controls.mains_breaker = false;
-        run(&mut plant, &controls, 3.0);
-        assert_eq!((plant.mains.voltage, plant.mains.frequency), ([0.0; 3], 0.0));
-        assert!(plant.genset.total_active() > 25.0);
-        assert!((plant.genset.frequency - 50.0).abs() < 1.0, "{:?}", plant.genset);
-
-        plant.fail_mains(false);
-        run(&mut plant, &controls, 2.0);
-        assert!(plant.mains_healthy());
-        let before = plant.angle();
-        plant.engine.governor.trim += 6.0;
-        run(&mut plant, &controls, 1.0);
-        assert_ne!(plant.angle(), before, "two sources apart run against each other");
-    }
+/// V of the phases that have any.
+pub(super) fn live_average(volts: [f64; 3]) -> f64 {
+    let (sum, count) = volts
+        .into_iter()
+        .filter(|volts| *volts >= DEAD_PHASE)
+        .fold((0.0, 0.0), |(sum, count), volts| (sum + volts, count + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
 }

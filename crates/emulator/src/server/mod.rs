@@ -1,6 +1,8 @@
 //! Sockets, lines and a clock for devices; everything that decides anything is in [`Device`] and in `line`.
 
 mod bind;
+mod clock;
+mod controller;
 mod door;
 mod line;
 mod pty;
@@ -18,16 +20,16 @@ use tokio::sync::Semaphore;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, MissedTickBehavior, interval};
 
-use crate::MAX_SPEED;
 use crate::config::Config;
 use crate::device::{Device, STEP};
 use crate::error::StartError;
 use bind::Socket;
+use clock::Clock;
+pub use clock::{Pace, SpeedError};
+pub use controller::Controller;
 pub use door::Statistics;
 use door::{Door, Served};
 
-/// A clock that was held up (a sleeping laptop, a debugger) does not make up for more than this.
-const MOST_LAPSE: Duration = Duration::from_secs(2);
 /// A client that takes no answers for so long is dropped.
 const WRITE_PATIENCE: Duration = Duration::from_secs(10);
 /// Far enough away to be never, near enough for a clock to hold.
@@ -55,9 +57,7 @@ pub async fn start_together(configs: Vec<Config>, listen: Vec<Endpoint>) -> Resu
     }
     let mut devices = Vec::new();
     for config in &configs {
-        if !(config.speed > 0.0 && config.speed <= MAX_SPEED) {
-            return Err(StartError::Speed { speed: config.speed.to_string() });
-        }
+        Pace::check(config.speed)?;
         if listen.is_empty() && config.listen.is_empty() {
             return Err(StartError::NoEndpoint);
         }
@@ -73,7 +73,11 @@ async fn serve(
 ) -> Result<Emulation, StartError> {
     let served: Vec<_> = devices
         .into_iter()
-        .map(|device| (device.unit(), device.profile(), Arc::new(Served::new(device))))
+        .zip(configs)
+        .map(|(device, config)| {
+            let clock = Clock::new(config.speed);
+            (device.unit(), device.profile(), Arc::new(Served::new(device, clock)))
+        })
         .collect();
     let rooms = rooms(configs, listen);
     for room in &rooms {
@@ -85,24 +89,34 @@ async fn serve(
     }
 
     let mut tasks = JoinSet::new();
-    for (config, (_, _, device)) in configs.iter().zip(&served) {
-        tasks.spawn(tick(Arc::clone(device), config.speed));
+    for (_, _, device) in &served {
+        tasks.spawn(tick(Arc::clone(device)));
     }
+    let mut controllers: Vec<_> = served
+        .iter()
+        .map(|(_, _, device)| Controller { served: Arc::clone(device), endpoints: Vec::new() })
+        .collect();
     let (mut urls, mut doors) = (Vec::new(), Vec::new());
     for ((url, socket), room) in sockets {
+        for (index, controller) in controllers.iter_mut().enumerate() {
+            if room.reaches(index) {
+                controller.endpoints.push(url.clone());
+            }
+        }
         let devices = room.members(&served).map(|(unit, _, device)| (*unit, Arc::clone(device))).collect();
         let door = Arc::new(Door::new(url.clone(), devices, room.places, room.idle));
         socket.open(Arc::clone(&door), &mut tasks);
         urls.push(url);
         doors.push(door);
     }
-    Ok(Emulation { urls, doors, tasks })
+    Ok(Emulation { urls, controllers, doors, tasks })
 }
 
 /// A running imitation; dropping it ends it.
 #[derive(Debug)]
 pub struct Emulation {
     urls: Vec<Endpoint>,
+    controllers: Vec<Controller>,
     doors: Vec<Arc<Door>>,
     tasks: JoinSet<()>,
 }
@@ -112,6 +126,11 @@ impl Emulation {
     /// then those of each configuration, in their order.
     pub fn urls(&self) -> &[Endpoint] {
         &self.urls
+    }
+
+    /// Its controllers, in the order of the configurations.
+    pub fn controllers(&self) -> &[Controller] {
+        &self.controllers
     }
 
     /// What has happened on all its endpoints so far.
@@ -172,13 +191,13 @@ fn rooms<'a>(configs: &'a [Config], listen: &'a [Endpoint]) -> Vec<Room<'a>> {
 }
 
 impl Room<'_> {
+    /// Whether the controller of this index is reached here.
+    fn reaches(&self, index: usize) -> bool {
+        self.only.is_none_or(|only| only == index)
+    }
+
     fn members<'m>(&self, served: &'m [Member]) -> impl Iterator<Item = &'m Member> {
-        let only = self.only;
-        served
-            .iter()
-            .enumerate()
-            .filter(move |(index, _)| only.is_none_or(|only| only == *index))
-            .map(|(_, m)| m)
+        served.iter().enumerate().filter(|(index, _)| self.reaches(*index)).map(|(_, member)| member)
     }
 
     /// Whether these controllers can be on one wire, and on this one.
@@ -204,17 +223,15 @@ impl Room<'_> {
     }
 }
 
-/// The clock of a plant.
-async fn tick(device: Arc<Served>, speed: f64) {
+/// Lets the clock of a plant run.
+async fn tick(device: Arc<Served>) {
     let mut interval = interval(STEP);
     interval.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut simulated = Duration::ZERO;
     let mut last = Instant::now();
     loop {
         interval.tick().await;
         let now = Instant::now();
-        simulated += now.duration_since(last).min(MOST_LAPSE).mul_f64(speed);
+        device.live(|clock| clock.lapse(now.duration_since(last)));
         last = now;
-        device.lock().advance(simulated);
     }
 }

@@ -1,269 +1,292 @@
-//! What an ACC1700 finds wrong: the words of registers 1 to 6 (shutdowns), 20 to 25 (warnings) and 33 (indications).
+//! What an ACC1700 finds wrong: the words of registers 1 to 6 (shutdowns), 20 to 25 (warnings), 33 and 34 (indications),
+//! and the fault of the particle filter in register 44.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use busbar_profile::BitSet;
 
-use crate::plant::Compressor;
+use super::causes::{Verdict, View, judge};
 
-use super::sequence::{Sequence, Status};
-
-/// Registers of the words by class. The maintenance words 25 and 34 follow the countdowns and are not kept here.
 pub(super) const SHUTDOWNS: RangeInclusive<u16> = 1..=6;
 pub(super) const WARNINGS: RangeInclusive<u16> = 20..=25;
-const INDICATIONS: RangeInclusive<u16> = 33..=33;
-const WORDS: usize = 34;
+pub(super) const INDICATIONS: RangeInclusive<u16> = 33..=34;
+/// The fault of the particle filter and, worked out from the ECU's alarms, that of the engine.
+pub(super) const FILTER_FAULT: (u16, u16) = (44, 0);
+pub(super) const ECU_SHUTDOWN: (u16, u16) = (1, 11);
+pub(super) const ECU_WARNING: (u16, u16) = (20, 15);
 
-/// Percent in the tank at which its float switch closes, and at which it opens again.
-const FLOAT_CLOSES: f64 = 20.0;
-const FLOAT_OPENS: f64 = 21.0;
-
-/// What the five digital inputs are wired to. Input 4 is free.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Inputs {
-    /// Input 1: float in the expansion tank, closed when the coolant is low.
-    pub(super) coolant_low: bool,
-    /// Input 2: thermal switch on the cylinder head, closed when it is hot.
-    pub(super) too_hot: bool,
-    /// Input 3: float in the fuel tank, closed when it is nearly empty.
-    pub(super) fuel_low: bool,
-    /// Input 5: contact of the canopy door, closed while the door is.
-    pub(super) door_open: bool,
-}
-
-impl Inputs {
-    pub(super) fn step(&mut self, plant: &Compressor, door_open: bool) {
-        let fuel = plant.tank.percent();
-        *self = Self {
-            coolant_low: plant.coolant_level() < 40.0,
-            too_hot: plant.engine.coolant > 108.0,
-            fuel_low: fuel < FLOAT_CLOSES || self.fuel_low && fuel < FLOAT_OPENS,
-            door_open,
-        };
-    }
-
-    /// Register 35: contacts that are closed. Bit 0 is the emergency stop.
-    pub(super) fn signals(self) -> BitSet {
-        let signals = [false, self.coolant_low, self.too_hot, self.fuel_low, false, !self.door_open];
-        bits(signals)
-    }
-
-    /// Register 45: inputs in the position that matters; the door contact is set to matter when it opens.
-    pub(super) fn active(self) -> BitSet {
-        bits([self.coolant_low, self.too_hot, self.fuel_low, false, self.door_open])
-    }
-}
-
-/// The positions that are true.
-pub(super) fn bits(values: impl IntoIterator<Item = bool>) -> BitSet {
-    (0..).zip(values).filter(|(_, value)| *value).map(|(bit, _)| bit).collect()
-}
-
-/// What is judged.
-pub(super) struct View<'a> {
-    pub(super) plant: &'a Compressor,
-    pub(super) sequence: &'a Sequence,
-    pub(super) inputs: Inputs,
-}
-
-impl View<'_> {
-    /// A value that only means something while the engine is watched.
-    fn watched(&self, verdict: Verdict) -> Verdict {
-        if self.sequence.status().is_watched() { verdict } else { Verdict::Fine }
-    }
-}
+const REGISTERS: [u16; 15] = [1, 2, 3, 4, 5, 6, 20, 21, 22, 23, 24, 25, 33, 34, FILTER_FAULT.0];
+/// The only alarm of its word that does not follow from others.
+const OF_THE_ENGINE: u16 = 1 << FILTER_FAULT.1;
 
 /// What is wrong now. A shutdown stays until [`Alarms::acknowledge`], all else goes with its cause.
 #[derive(Clone, Debug)]
 pub(super) struct Alarms {
-    words: [u16; WORDS],
-    pending: [Duration; WATCHES.len()],
+    words: [Word; REGISTERS.len()],
+}
+
+/// One register, a bit an alarm.
+#[derive(Clone, Debug, Default)]
+struct Word {
+    /// The plant has a cause for it.
+    caused: u16,
+    /// Whatever the plant says.
+    injected: u16,
+    /// Shutdowns that nobody has acknowledged.
+    latched: u16,
+    /// Those that the event log has.
+    noted: u16,
+    pending: [Duration; 16],
+}
+
+impl Word {
+    fn active(&self) -> u16 {
+        self.caused | self.injected | self.latched
+    }
 }
 
 impl Alarms {
     pub(super) fn new() -> Self {
-        Self { words: [0; WORDS], pending: [Duration::ZERO; WATCHES.len()] }
+        Self { words: Default::default() }
     }
 
-    pub(super) fn step(&mut self, dt: Duration, view: &View<'_>) {
-        for (watch, pending) in WATCHES.iter().zip(&mut self.pending) {
-            let (register, bit) = watch.at;
-            let Some(word) = self.words.get_mut(usize::from(register)) else { continue };
-            let active = *word >> bit & 1 == 1;
-            let judged = (watch.judge)(view);
+    /// Judges the plant; how many alarms are new.
+    pub(super) fn step(&mut self, dt: Duration, view: &View<'_>) -> u32 {
+        judge(view, |judgement| {
+            let (register, bit) = judgement.at;
+            let Some(word) = self.word_mut(register) else { return };
+            let Some(pending) = word.pending.get_mut(usize::from(bit)) else { return };
+            let active = word.caused >> bit & 1 == 1;
             // An alarm needs its cause for the whole delay, and goes when the cause is clearly gone.
-            *pending = if judged == Verdict::Alarm { *pending + dt } else { Duration::ZERO };
-            let stays = match judged {
-                Verdict::Alarm => active || *pending >= watch.delay,
+            *pending = if judgement.verdict == Verdict::Alarm { *pending + dt } else { Duration::ZERO };
+            let stays = match judgement.verdict {
+                Verdict::Alarm => active || *pending >= judgement.delay,
                 Verdict::Between => active,
-                Verdict::Fine => active && SHUTDOWNS.contains(&register),
+                Verdict::Fine => false,
             };
-            *word = *word & !(1 << bit) | u16::from(stays) << bit;
-        }
-    }
-
-    /// Forgets the shutdowns; what is still wrong comes again.
-    pub(super) fn acknowledge(&mut self) {
-        for register in SHUTDOWNS {
-            if let Some(word) = self.words.get_mut(usize::from(register)) {
-                *word = 0;
+            word.caused = word.caused & !(1 << bit) | u16::from(stays) << bit;
+        });
+        let mut new = 0;
+        for (register, word) in REGISTERS.into_iter().zip(&mut self.words) {
+            if SHUTDOWNS.contains(&register) {
+                word.latched = word.active();
             }
+            new += (word.active() & !word.noted).count_ones();
+            word.noted = word.active();
+        }
+        new
+    }
+
+    /// Forgets the shutdowns that have no cause any more.
+    pub(super) fn acknowledge(&mut self, view: &View<'_>) {
+        judge(view, |judgement| {
+            let (register, bit) = judgement.at;
+            if judgement.verdict != Verdict::Alarm
+                && SHUTDOWNS.contains(&register)
+                && let Some(word) = self.word_mut(register)
+            {
+                word.caused &= !(1 << bit);
+            }
+        });
+        for (register, word) in REGISTERS.into_iter().zip(&mut self.words) {
+            let stands = word.caused | word.injected;
+            word.latched = if SHUTDOWNS.contains(&register) { stands } else { 0 };
         }
     }
 
-    /// Registers with their bits.
-    pub(super) fn words(&self) -> impl Iterator<Item = (u16, BitSet)> + '_ {
-        let registers = SHUTDOWNS.chain(WARNINGS).chain(INDICATIONS);
-        registers.filter_map(|register| {
-            let word = self.words.get(usize::from(register))?;
-            Some((register, BitSet::from_registers(&[*word])))
-        })
+    /// Takes an alarm for active whatever the plant says; false where there is none, or it follows from others.
+    pub(super) fn inject(&mut self, register: u16, bit: u16, active: bool) -> bool {
+        let Some(word) = self.word_mut(register) else { return false };
+        let mask = 1_u16.checked_shl(bit.into()).unwrap_or_default();
+        if register == FILTER_FAULT.0 && mask & OF_THE_ENGINE == 0 {
+            return false;
+        }
+        word.injected = if active { word.injected | mask } else { word.injected & !mask };
+        true
+    }
+
+    pub(super) fn word(&self, register: u16) -> BitSet {
+        let word = REGISTERS.iter().position(|known| *known == register).and_then(|at| self.words.get(at));
+        BitSet::from_registers(&[word.map_or(0, Word::active)])
+    }
+
+    pub(super) fn is_active(&self, (register, bit): (u16, u16)) -> bool {
+        self.word(register).contains(bit)
     }
 
     pub(super) fn any_shutdown(&self) -> bool {
-        self.words().any(|(register, word)| SHUTDOWNS.contains(&register) && !word.is_empty())
+        SHUTDOWNS.into_iter().any(|register| !self.word(register).is_empty())
     }
 
-    /// How many there are, of any class.
-    pub(super) fn count(&self) -> usize {
-        self.words().map(|(_, word)| word.len()).sum()
+    fn word_mut(&mut self, register: u16) -> Option<&mut Word> {
+        let at = REGISTERS.iter().position(|known| *known == register)?;
+        self.words.get_mut(at)
     }
-}
-
-/// One cause, watched for some time.
-struct Watch {
-    /// Register and bit.
-    at: (u16, u16),
-    delay: Duration,
-    judge: fn(&View<'_>) -> Verdict,
-}
-
-const fn watch(register: u16, bit: u16, seconds: u64, judge: fn(&View<'_>) -> Verdict) -> Watch {
-    Watch { at: (register, bit), delay: Duration::from_secs(seconds), judge }
-}
-
-/// Thresholds and delays as a site would set them; the manual has none.
-const WATCHES: [Watch; 23] = [
-    watch(1, 1, 1, |v| above(v.plant.engine.speed, 1725.0, 1700.0)),
-    watch(1, 2, 2, |v| v.watched(below(v.plant.engine.speed, 700.0, 720.0))),
-    watch(1, 8, 0, |v| when(v.sequence.failed_to_start())),
-    watch(1, 13, 3, |v| v.watched(when(v.inputs.coolant_low))),
-    watch(1, 14, 2, |v| v.watched(when(v.inputs.too_hot))),
-    watch(2, 1, 3, |v| v.watched(above(v.plant.engine.coolant, 104.0, 102.0))),
-    watch(2, 6, 2, |v| v.watched(below(oil_pressure(v.plant), 100.0, 120.0))),
-    watch(3, 5, 3, |v| above(v.plant.air.temperature, 115.0, 112.0)),
-    watch(4, 9, 1, |v| above(v.plant.air.pressure, 950.0, 900.0)),
-    watch(20, 0, 1, |v| above(v.plant.engine.speed, 1650.0, 1630.0)),
-    watch(20, 1, 1, |v| v.watched(below(v.plant.engine.speed, 800.0, 820.0))),
-    watch(20, 3, 0, |v| when(v.plant.filter.needs_a_person())),
-    watch(20, 8, 0, |v| when(v.sequence.status() == Status::StopFailure)),
-    watch(20, 9, 10, |v| v.watched(below(charger(v.plant), 24.0, 25.0))),
-    watch(20, 10, 5, |v| above(battery(v.plant), 30.0, 29.5)),
-    watch(20, 11, 10, |v| below(battery(v.plant), 23.5, 24.0)),
-    watch(21, 1, 3, |v| above(v.plant.engine.coolant, 99.0, 97.0)),
-    watch(21, 2, 10, |v| below(v.plant.engine.coolant, 0.0, 2.0)),
-    watch(21, 6, 2, |v| v.watched(below(oil_pressure(v.plant), 140.0, 160.0))),
-    watch(22, 5, 3, |v| above(v.plant.air.temperature, 108.0, 105.0)),
-    watch(23, 9, 2, |v| above(v.plant.air.pressure, 850.0, 830.0)),
-    watch(24, 2, 2, |v| when(v.inputs.fuel_low)),
-    watch(33, 4, 0, |v| when(v.inputs.door_open)),
-];
-
-fn battery(plant: &Compressor) -> f64 {
-    plant.voltages()[0]
-}
-
-fn charger(plant: &Compressor) -> f64 {
-    plant.voltages()[1]
-}
-
-/// kPa.
-fn oil_pressure(plant: &Compressor) -> f64 {
-    plant.engine.oil_pressure * 100.0
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Verdict {
-    Alarm,
-    /// Inside the hysteresis: stays what it is.
-    Between,
-    Fine,
-}
-
-fn below(value: f64, alarm: f64, fine: f64) -> Verdict {
-    match value {
-        value if value < alarm => Verdict::Alarm,
-        value if value < fine => Verdict::Between,
-        _ => Verdict::Fine,
-    }
-}
-
-fn above(value: f64, alarm: f64, fine: f64) -> Verdict {
-    below(-value, -alarm, -fine)
-}
-
-fn when(cause: bool) -> Verdict {
-    if cause { Verdict::Alarm } else { Verdict::Fine }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::Tank;
+    use crate::plant::Compressor;
+
+    use super::super::Model;
+    use super::super::ecu::Ecu;
+    use super::super::inputs::Inputs;
+    use super::super::readings::{Reading, Readings};
+    use super::super::sequence::Sequence;
+    use super::super::setup::Setup;
 
     const SECOND: Duration = Duration::from_secs(1);
 
-    fn judge(alarms: &mut Alarms, plant: &Compressor, inputs: Inputs, seconds: u32) -> Vec<(u16, u16)> {
-        let sequence = Sequence::new(1);
-        for _ in 0..seconds {
-            alarms.step(SECOND, &View { plant, sequence: &sequence, inputs });
+    /// A unit at rest, whose readings can be changed.
+    struct Bench {
+        alarms: Alarms,
+        readings: Readings,
+        ecu: Ecu,
+        inputs: Inputs,
+        sequence: Sequence,
+        setup: Setup,
+        services_due: [bool; 10],
+    }
+
+    impl Bench {
+        fn new(changes: &[(&str, &str)]) -> Self {
+            Self {
+                alarms: Alarms::new(),
+                readings: Readings::of(&Compressor::new(1), Model::Acc1700Can, true),
+                ecu: Ecu::new(),
+                inputs: Inputs::default(),
+                sequence: Sequence::new(1),
+                setup: Setup::with(changes),
+                services_due: [false; 10],
+            }
         }
-        alarms.words().flat_map(|(register, word)| word.iter().map(move |bit| (register, bit))).collect()
+
+        fn view(&mut self) -> (&mut Alarms, View<'_>) {
+            let view = View {
+                sequence: &self.sequence,
+                readings: &self.readings,
+                inputs: &self.inputs,
+                ecu: Some(&self.ecu),
+                services_due: self.services_due,
+                setup: &self.setup,
+            };
+            (&mut self.alarms, view)
+        }
+
+        /// Registers and bits that are active after some seconds.
+        fn pass(&mut self, seconds: u32) -> Vec<(u16, u16)> {
+            let (alarms, view) = self.view();
+            for _ in 0..seconds {
+                alarms.step(SECOND, &view);
+            }
+            REGISTERS
+                .into_iter()
+                .flat_map(|at| alarms.word(at).iter().map(move |bit| (at, bit)).collect::<Vec<_>>())
+                .collect()
+        }
+
+        fn acknowledge(&mut self) {
+            let (alarms, view) = self.view();
+            alarms.acknowledge(&view);
+        }
     }
 
     #[test]
     fn a_healthy_plant_at_rest_has_none() {
-        let plant = Compressor::new(1);
-        assert_eq!(judge(&mut Alarms::new(), &plant, Inputs::default(), 60), []);
-    }
-
-    #[test]
-    fn the_fuel_float_has_a_hysteresis_and_warns_through_input_3() {
-        let mut plant = Compressor::new(1);
-        let mut inputs = Inputs::default();
-        let mut alarms = Alarms::new();
-        let mut at = |percent, seconds| {
-            plant.tank = Tank::new(percent);
-            inputs.step(&plant, false);
-            judge(&mut alarms, &plant, inputs, seconds)
-        };
-        assert_eq!(at(20.5, 5), []);
-        assert_eq!(at(19.9, 1), [], "shorter than the delay");
-        assert_eq!(at(19.9, 1), [(24, 2)]);
-        assert_eq!(at(20.5, 5), [(24, 2)]);
-        assert_eq!(at(21.1, 1), []);
-    }
-
-    #[test]
-    fn the_door_contact_is_closed_and_inactive_while_the_door_is_shut() {
-        let shut = Inputs::default();
-        assert_eq!((shut.signals().register(0), shut.active().register(0)), (1 << 5, 0));
-        let open = Inputs { door_open: true, ..shut };
-        assert_eq!((open.signals().register(0), open.active().register(0)), (0, 1 << 4));
-        assert_eq!(judge(&mut Alarms::new(), &Compressor::new(1), open, 1), [(33, 4)]);
+        assert_eq!(Bench::new(&[]).pass(60), []);
     }
 
     #[test]
     fn a_warning_goes_with_its_cause_and_a_shutdown_stays_until_acknowledged() {
-        let mut plant = Compressor::new(1);
-        let mut alarms = Alarms::new();
-        plant.air.pressure = 960.0;
-        assert_eq!(judge(&mut alarms, &plant, Inputs::default(), 2), [(4, 9), (23, 9)]);
-        plant.air.pressure = 500.0;
-        assert_eq!(judge(&mut alarms, &plant, Inputs::default(), 1), [(4, 9)]);
-        assert!(alarms.any_shutdown());
-        alarms.acknowledge();
-        assert_eq!(judge(&mut alarms, &plant, Inputs::default(), 1), []);
+        let mut bench = Bench::new(&[]);
+        bench.readings.discharge_pressure = Reading::Value(960.0);
+        assert_eq!(bench.pass(1), [(4, 9), (23, 9)]);
+        bench.acknowledge();
+        assert_eq!(bench.pass(1), [(4, 9), (23, 9)], "what is still wrong stays");
+        bench.readings.discharge_pressure = Reading::Value(500.0);
+        assert_eq!(bench.pass(1), [(4, 9)]);
+        assert!(bench.alarms.any_shutdown());
+        bench.acknowledge();
+        assert!(!bench.alarms.any_shutdown());
+        assert_eq!(bench.pass(1), []);
+    }
+
+    #[test]
+    fn an_alarm_needs_its_delay_and_comes_back_a_little_later_than_its_threshold() {
+        let mut bench = Bench::new(&[("sensor_delay", "4")]);
+        for (percent, seconds, expected) in [
+            (9.9, 3, &[][..]),
+            (10.1, 1, &[]),
+            (9.9, 3, &[]),
+            (9.9, 1, &[(22, 2)]),
+            (12.9, 9, &[(22, 2)]),
+            (13.0, 1, &[]),
+        ] {
+            bench.readings.sensors[2] = Reading::Value(percent);
+            assert_eq!(bench.pass(seconds), expected, "{percent} for {seconds} s");
+        }
+    }
+
+    #[test]
+    fn an_injected_alarm_is_one_whatever_the_plant_says() {
+        let mut bench = Bench::new(&[]);
+        for at in [(4, 9), (23, 9), (20, 4), (33, 3)] {
+            assert!(bench.alarms.inject(at.0, at.1, true));
+        }
+        assert_eq!(bench.pass(1), [(4, 9), (20, 4), (23, 9), (33, 3)]);
+        bench.acknowledge();
+        assert_eq!(bench.pass(1).len(), 4, "nobody acknowledges what is still there");
+        for at in [(4, 9), (23, 9), (20, 4), (33, 3)] {
+            assert!(bench.alarms.inject(at.0, at.1, false));
+        }
+        assert_eq!(bench.pass(1), [(4, 9)], "as any other shutdown");
+        bench.acknowledge();
+        assert_eq!(bench.pass(1), []);
+        assert!(!bench.alarms.inject(44, 9, true) && !bench.alarms.inject(0, 1, true));
+    }
+
+    #[test]
+    fn each_service_does_what_it_is_set_to() {
+        let changes =
+            [("maintenance_1_action", "0"), ("maintenance_2_action", "1"), ("maintenance_10_action", "3")];
+        let mut bench = Bench::new(&changes);
+        for service in [0, 1, 2, 9] {
+            bench.services_due[service] = true;
+        }
+        assert_eq!(bench.pass(1), [(6, 9), (25, 2), (34, 1)]);
+    }
+
+    #[test]
+    fn each_sensor_has_an_open_a_high_and_a_low_of_both_kinds() {
+        const FIRST: [(u16, u16); 5] = [(2, 8), (2, 12), (3, 0), (3, 4), (3, 8)];
+        for (index, (register, bit)) in FIRST.into_iter().enumerate() {
+            let set = |what: &str, value: &str| (format!("sensor_{}_{what}", index + 1), value.to_owned());
+            let limits = [
+                set("high_warning", "10"),
+                set("high_shutdown", "20"),
+                set("low_warning", "0"),
+                set("low_shutdown", "-10"),
+            ];
+            for (open, reading, expected) in [
+                ("0", Reading::Broken, vec![]),
+                ("2", Reading::Broken, vec![(register + 19, bit)]),
+                ("3", Reading::Broken, vec![(register, bit)]),
+                ("3", Reading::Value(11.0), vec![(register + 19, bit + 1)]),
+                ("3", Reading::Value(21.0), vec![(register, bit + 1), (register + 19, bit + 1)]),
+                ("3", Reading::Value(-1.0), vec![(register + 19, bit + 2)]),
+                ("3", Reading::Value(-11.0), vec![(register, bit + 2), (register + 19, bit + 2)]),
+                ("3", Reading::Absent, vec![]),
+            ] {
+                let mut changes = limits.to_vec();
+                changes.push(set("open_action", open));
+                let changes: Vec<_> =
+                    changes.iter().map(|(id, value)| (id.as_str(), value.as_str())).collect();
+                let mut bench = Bench::new(&changes);
+                bench.readings.sensors[index] = reading;
+                assert_eq!(bench.pass(3), expected, "sensor {}, {reading:?}", index + 1);
+            }
+        }
     }
 }

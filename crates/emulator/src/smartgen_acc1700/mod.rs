@@ -1,47 +1,49 @@
 //! SmartGen ACC1700 and ACC1700CAN: keys, lock and the situation the unit is in.
 //!
-//! Power-on finds the unit in stop mode, at rest, unlocked. Where the manual is silent this is what the imitation does:
-//! - the start key is taken in standby only, and turns stop mode into manual mode; it never loads: the unit waits for
-//!   the load key, so that the documented procedure is needed;
-//! - the load key turns over between waiting (8) and normal running (9) and is dead in every other status. The load
-//!   indicator (43.6) is that choice; the load valve (43.5) then follows the discharge pressure between two limits, while
-//!   status and indicator stay. Idle running (43.8) is status 8;
-//! - the stop key is always taken. A loaded unit goes to cooling with 43.7 set, and the cooling delay stands still until
-//!   the pressure has fallen; status 8 does the same. A second press does not hurry it. It also acknowledges shutdowns;
-//! - a shutdown closes the fuel at once, and no start is taken until it is acknowledged;
-//! - locked means that the start and load keys are dead; stop and the remote outputs are not, and a running unit goes on;
-//! - the down key turns a page of the display, which no register shows;
-//! - remote outputs 1 to 4 are auxiliary outputs 1 to 4 (37.2 to 37.5), as the unit may be set up;
-//! - inputs: 1 low coolant and 2 high temperature stop the engine, 3 is the fuel float and warns, 4 is free, 5 is the door
-//!   contact and indicates;
-//! - sensors: 3 fuel level, 4 discharge temperature, 5 discharge pressure at 4 to 20 mA. Of an ACC1700CAN the ECU sends
-//!   engine temperature and oil pressure, sensor 1 is not fitted and 2 is the pressure lost across the oil separator. An
-//!   ACC1700 has 1 and 2 for temperature and oil pressure, and none of what only an ECU knows;
-//! - no ECU here measures the coolant's pressure;
-//! - the particle filter asks (44.1) when it is full, burns (44.3, 44.7) as soon as the exhaust is hot, wants a person (20.3,
-//!   44.5) when it never is, and fails (44.0) in the end. Manual heating (0.14), inhibition (44.2), response (44.4) and engine
-//!   fault (44.9) never show yet;
-//! - maintenance 1 to 8 warn when their time is over, 9 and 10 indicate, none stops the engine;
-//! - events are starts, stops and new alarms; their number ends at 99.
+//! From the inside out: [`readings`] are what it measures, [`causes`] and [`alarms`] what it finds wrong, [`sequence`] and
+//! [`load`] what it does. What it does where the manual is silent stands in `docs/imitation/smartgen-acc1700.md`.
 
 mod alarms;
+mod causes;
+mod ecu;
+mod inputs;
+mod levers;
+mod load;
+#[cfg(test)]
+mod page;
+mod readings;
 mod render;
 mod sequence;
+mod services;
+mod setup;
 mod story;
 
 use std::time::Duration;
 
 use busbar_modbus::ExceptionCode;
+use busbar_profile::Profile;
 
 use crate::bank::Bank;
+use crate::levers::{Lever, Position};
 use crate::panel::Panel;
-use crate::plant::{Compressor, Tank};
+use crate::plant::{Compressor, Orders, Tank};
 use crate::random::Random;
 use crate::rules::Refusals;
+use crate::settings::Settings;
 
-use alarms::{Alarms, Inputs, View};
-use sequence::{Sensed, Sequence, Status};
+use alarms::Alarms;
+use causes::View;
+use ecu::Ecu;
+use inputs::{Hands, Inputs};
+use load::{Demand, LoadValve};
+use readings::Readings;
+use sequence::{Cause, Sensed, Sequence, Status};
+use services::Services;
+use setup::Setup;
 use story::Scene;
+
+#[cfg(test)]
+const PROFILE: &str = "smartgen-acc1700";
 
 const START: u16 = 0;
 const STOP: u16 = 1;
@@ -50,10 +52,11 @@ const UNLOCK: u16 = 18;
 const LOCK: u16 = 19;
 const FIRST_OUTPUT: u16 = 20;
 
-/// Hours between two services of maintenance 1 to 10, as their names suggest.
-const SERVICES: [u64; 10] = [500, 500, 1000, 2000, 250, 500, 250, 500, 2000, 4000];
 /// The event log has no more room (register 120).
 const MOST_EVENTS: u16 = 99;
+
+/// kPa of oil pressure above which an engine is taken for one that still turns.
+const TURNING_OIL: f64 = 50.0;
 
 /// The models of the manual's title.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,51 +84,65 @@ enum Mode {
 /// The unit and its plant.
 #[derive(Clone, Debug)]
 pub(crate) struct Acc1700 {
+    profile: &'static Profile,
     plant: Compressor,
-    sequence: Sequence,
-    alarms: Alarms,
+    setup: Setup,
+    readings: Readings,
     inputs: Inputs,
+    ecu: Option<Ecu>,
+    sequence: Sequence,
+    valve: LoadValve,
+    alarms: Alarms,
+    services: Services,
     model: Model,
     mode: Mode,
     locked: bool,
     outputs: [bool; 4],
     story: bool,
     scene: Scene,
+    /// The switch at input 4.
+    switch_closed: bool,
+    /// How much longer somebody's heating goes on.
+    heating_left: Duration,
     events: u16,
     /// Total running time in seconds when the latest run began.
     run_began: u64,
-    /// Total running time in seconds at which each service is due.
-    services_due: [u64; 10],
 }
 
 impl Acc1700 {
     /// A unit with its plant at rest.
-    pub(crate) fn new(model: Model, seed: u64, story: bool) -> Self {
+    pub(crate) fn new(profile: &'static Profile, model: Model, seed: u64, story: bool) -> Self {
         let mut random = Random::new(seed ^ 0xACC);
         let mut plant = Compressor::new(seed);
         if story {
             // Low enough that the story reaches the warning.
             plant.tank = Tank::new(22.3);
         }
+        let setup = Setup::of(&Settings::of(profile));
         let seconds = (plant.engine.hours * 3600.0) as u64;
-        let left =
-            |hours: u64, random: &mut Random| (hours as f64 * 3600.0 * random.between(0.2, 0.9)) as u64;
         let mut unit = Self {
-            sequence: Sequence::new((plant.engine.hours / 1.7) as u16),
-            alarms: Alarms::new(),
+            profile,
+            readings: Readings::of(&plant, model, true),
             inputs: Inputs::default(),
+            ecu: (model == Model::Acc1700Can).then(Ecu::new),
+            sequence: Sequence::new((plant.engine.hours / 1.7) as u16),
+            valve: LoadValve::default(),
+            alarms: Alarms::new(),
             model,
             mode: Mode::Stop,
             locked: false,
             outputs: [false; 4],
             story,
             scene: Scene::NOTHING,
+            switch_closed: false,
+            heating_left: Duration::ZERO,
             events: random.between(12.0, 40.0) as u16,
             run_began: seconds - random.between(1200.0, 9000.0) as u64,
-            services_due: SERVICES.map(|hours| seconds + left(hours, &mut random)),
+            services: Services::new(seconds, &setup, &mut random),
+            setup,
             plant,
         };
-        unit.inputs.step(&unit.plant, false);
+        unit.measure(Duration::ZERO);
         unit
     }
 
@@ -133,22 +150,24 @@ impl Acc1700 {
         if self.locked || self.alarms.any_shutdown() {
             return;
         }
-        if self.sequence.start() {
+        if self.sequence.react(Cause::StartKey, &self.setup) {
             self.mode = Mode::Manual;
+            self.heating_left = Duration::ZERO;
             self.note(1);
         }
     }
 
     fn press_stop(&mut self) {
         self.mode = Mode::Stop;
-        self.sequence.stop();
+        self.sequence.react(Cause::StopKey, &self.setup);
+        self.valve.follow(self.demand(), &self.setup);
         self.sequence.acknowledge();
-        self.alarms.acknowledge();
+        self.judge(Alarms::acknowledge);
     }
 
     fn press_load(&mut self) {
-        if !self.locked {
-            self.sequence.toggle_load(self.plant.air.pressure);
+        if !self.locked && self.sequence.react(Cause::LoadKey, &self.setup) {
+            self.valve.load(self.demand(), &self.setup);
         }
     }
 
@@ -167,7 +186,61 @@ impl Acc1700 {
         }
     }
 
-    fn note(&mut self, events: usize) {
+    /// Reads contacts, sensors and the ECU.
+    fn measure(&mut self, dt: Duration) {
+        let watched = self.sequence.status().is_watched();
+        if let Some(ecu) = &mut self.ecu {
+            ecu.step(&self.plant, watched);
+        }
+        self.readings = Readings::of(&self.plant, self.model, self.ecu.as_ref().is_some_and(Ecu::talks));
+        let hands = Hands {
+            emergency_stop: self.plant.emergency_stop,
+            switch_closed: self.switch_closed,
+            door_open: self.plant.door_open || self.scene.attendant,
+        };
+        self.inputs.step(dt, &self.plant, hands, &self.setup);
+    }
+
+    fn sensed(&self) -> Sensed {
+        let (readings, setup) = (&self.readings, &self.setup);
+        Sensed {
+            running: readings.turns(setup.disconnect_speed, setup.disconnect_oil_pressure),
+            turning: readings.turns(0.0, TURNING_OIL),
+            pressure: readings.discharge_pressure.value(),
+        }
+    }
+
+    fn demand(&self) -> Demand {
+        Demand {
+            loaded: self.sequence.is_loaded(),
+            pressure: self.readings.discharge_pressure.value(),
+            engine_load: self.readings.engine_load.value(),
+        }
+    }
+
+    /// Lets the alarms see everything else.
+    fn judge<T>(&mut self, act: impl FnOnce(&mut Alarms, &View<'_>) -> T) -> T {
+        let view = View {
+            sequence: &self.sequence,
+            readings: &self.readings,
+            inputs: &self.inputs,
+            ecu: self.ecu.as_ref(),
+            services_due: self.services.left(self.running_seconds()).map(|left| left == 0),
+            setup: &self.setup,
+        };
+        act(&mut self.alarms, &view)
+    }
+
+    /// Somebody has switched manual heating on (0.14).
+    fn is_heating(&self) -> bool {
+        !self.heating_left.is_zero()
+    }
+
+    fn orders(&self) -> Orders {
+        Orders { load_valve: self.valve.is_open(), ..self.sequence.orders() }
+    }
+
+    fn note(&mut self, events: u32) {
         let events = u16::try_from(events).unwrap_or(MOST_EVENTS);
         self.events = self.events.saturating_add(events).min(MOST_EVENTS);
     }
@@ -186,22 +259,22 @@ impl Panel for Acc1700 {
         self.plant.tank.other_draw = self.scene.fuel_draw;
         self.plant.refilling = self.scene.refills(self.plant.tank.percent());
         // The plant first: the status then tells of an engine that has fired, in the same image.
-        self.plant.step(dt.as_secs_f64(), &self.sequence.orders());
+        self.plant.step(dt.as_secs_f64(), &self.orders());
+        self.measure(dt);
+        self.heating_left = self.heating_left.saturating_sub(dt);
 
         let (status, starts) = (self.sequence.status(), self.sequence.starts);
-        self.sequence.step(dt, Sensed::from(&self.plant));
+        self.sequence.step(dt, self.sensed(), &self.setup);
         if self.sequence.starts != starts {
             self.run_began = self.running_seconds();
         }
 
-        self.inputs.step(&self.plant, self.scene.attendant);
-        let alarms = self.alarms.count();
-        let view = View { plant: &self.plant, sequence: &self.sequence, inputs: self.inputs };
-        self.alarms.step(dt, &view);
-        self.note(self.alarms.count().saturating_sub(alarms));
+        let new = self.judge(|alarms, view| alarms.step(dt, view));
+        self.note(new);
         if self.alarms.any_shutdown() {
-            self.sequence.trip();
+            self.sequence.react(Cause::Shutdown, &self.setup);
         }
+        self.valve.step(dt, self.demand(), &self.setup);
         if status != Status::Standby && self.sequence.status() == Status::Standby {
             self.note(1);
         }
@@ -245,6 +318,28 @@ impl Panel for Acc1700 {
             protected: ExceptionCode::ILLEGAL_DATA_ADDRESS,
         }
     }
+
+    fn configure(&mut self, settings: &Settings) {
+        self.setup = Setup::of(settings);
+        self.services.configure(self.running_seconds(), &self.setup);
+    }
+
+    fn levers(&self) -> &'static [Lever] {
+        &levers::LEVERS
+    }
+
+    fn lever(&self, id: &str) -> Option<Position> {
+        levers::lever(self, id)
+    }
+
+    fn pull(&mut self, id: &str, to: Position) {
+        levers::pull(self, id, to);
+    }
+
+    fn inject(&mut self, point: &str, bit: u16, active: bool) -> bool {
+        let point = self.profile.point(point);
+        point.is_some_and(|point| self.alarms.inject(point.address, bit, active))
+    }
 }
 
 #[cfg(test)]
@@ -253,6 +348,10 @@ mod tests {
 
     const TENTH: Duration = Duration::from_millis(100);
 
+    fn unit(model: Model) -> Acc1700 {
+        Acc1700::new(busbar_profile::builtin(PROFILE).unwrap(), model, 1, false)
+    }
+
     fn pass(unit: &mut Acc1700, seconds: u32) {
         for _ in 0..10 * seconds {
             unit.step(TENTH);
@@ -260,7 +359,7 @@ mod tests {
     }
 
     fn loaded() -> Acc1700 {
-        let mut unit = Acc1700::new(Model::Acc1700Can, 1, false);
+        let mut unit = unit(Model::Acc1700Can);
         unit.write_coil(START, true);
         pass(&mut unit, 45);
         unit.write_coil(LOAD_UNLOAD, true);
@@ -312,7 +411,7 @@ mod tests {
 
     #[test]
     fn the_event_log_ends_at_99() {
-        let mut unit = Acc1700::new(Model::Acc1700, 1, false);
+        let mut unit = unit(Model::Acc1700);
         for _ in 0..100 {
             unit.note(3);
         }

@@ -4,23 +4,24 @@ use busbar_profile::BitSet;
 
 use crate::bank::Bank;
 
-use super::alarms::{SHUTDOWNS, WARNINGS, bits};
+use super::alarms::{ECU_SHUTDOWN, ECU_WARNING, FILTER_FAULT, INDICATIONS, SHUTDOWNS, WARNINGS};
+use super::ecu::Ecu;
+use super::inputs::bits;
+use super::readings::Reading;
 use super::sequence::Status;
+use super::setup::Action;
 use super::{Acc1700, Mode, Model};
 
 const COMMON_STATUS: u16 = 0;
-const MAINTENANCE_WARNINGS: u16 = 25;
-
-const MAINTENANCE_INDICATIONS: u16 = 34;
 const COUNTDOWNS: u16 = 160;
-/// Maintenance 1 to 8 warn, the others indicate.
-const WARN: u16 = 8;
 
 /// What only an ECU sends; 77 to 85 and 90 to 93.
 const FROM_THE_ECU: [std::ops::RangeInclusive<u16>; 2] = [77..=85, 90..=93];
 
 /// kPa that the discharge pressure transmitter sends as 20 mA.
 const TRANSMITTER: f64 = 1600.0;
+/// What an ohmmeter without a sensor shows: the end of its range.
+const OPEN_CIRCUIT: f64 = 6553.5;
 
 /// Stores all of them.
 pub(super) fn registers(unit: &Acc1700, bank: &mut Bank) {
@@ -30,10 +31,11 @@ pub(super) fn registers(unit: &Acc1700, bank: &mut Bank) {
     common_status(unit, bank);
     inputs_and_outputs(unit, bank);
     indicators(unit, bank);
+    engine_indicators(unit, bank);
     sensors(unit, bank);
-    match unit.model {
-        Model::Acc1700 => FROM_THE_ECU.into_iter().flatten().for_each(|address| bank.absent(address)),
-        Model::Acc1700Can => ecu(unit, bank),
+    match &unit.ecu {
+        Some(ecu) if ecu.talks() => sent_by_the_ecu(unit, bank),
+        _ => FROM_THE_ECU.into_iter().flatten().for_each(|address| bank.absent(address)),
     }
     measurements(unit, bank);
     bank.code(94, unit.sequence.status() as u16);
@@ -43,11 +45,20 @@ pub(super) fn registers(unit: &Acc1700, bank: &mut Bank) {
 
 fn alarms(unit: &Acc1700, bank: &mut Bank) {
     let due = services_due(bank);
-    for (register, word) in unit.alarms.words() {
+    for register in SHUTDOWNS.chain(WARNINGS).chain(INDICATIONS) {
+        let action = match register {
+            6 => Action::Shutdown,
+            25 => Action::Warning,
+            34 => Action::Indication,
+            _ => Action::Nothing,
+        };
+        let mut word = unit.alarms.word(register);
+        if action != Action::Nothing {
+            let services = (0..).zip(&unit.setup.services).filter(|(_, service)| service.due == action);
+            services.filter(|(bit, _)| due.contains(*bit)).for_each(|(bit, _)| word.insert(bit));
+        }
         bank.bits(register, word);
     }
-    bank.bits(MAINTENANCE_WARNINGS, due.iter().filter(|bit| *bit < WARN).collect());
-    bank.bits(MAINTENANCE_INDICATIONS, due.iter().filter(|bit| *bit >= WARN).collect());
 }
 
 /// Maintenance numbers less one whose countdown shows nothing left.
@@ -66,62 +77,73 @@ fn common_status(unit: &Acc1700, bank: &mut Bank) {
     let mut status = bits([shutdown || warning, shutdown, warning]);
     status.set(10, unit.mode == Mode::Manual);
     status.set(11, unit.mode == Mode::Stop);
+    status.set(14, unit.is_heating());
     status.set(15, unit.locked);
     bank.bits(COMMON_STATUS, status);
 }
 
 fn inputs_and_outputs(unit: &Acc1700, bank: &mut Bank) {
-    let orders = unit.sequence.orders();
+    let orders = unit.orders();
     bank.bits(35, unit.inputs.signals());
     bank.bits(45, unit.inputs.active());
     bank.bits(37, bits([orders.fuel, orders.starter].into_iter().chain(unit.outputs)));
 }
 
 fn indicators(unit: &Acc1700, bank: &mut Bank) {
-    let (sequence, plant) = (&unit.sequence, &unit.plant);
+    let sequence = &unit.sequence;
     let mut indicators = BitSet::EMPTY;
     indicators.set(4, sequence.status().is_running());
-    indicators.set(5, sequence.orders().load_valve);
+    indicators.set(5, unit.valve.is_open());
     indicators.set(6, sequence.is_loaded());
     indicators.set(7, sequence.waits_for_pressure());
     indicators.set(8, sequence.status() == Status::WaitToOnload);
     bank.bits(43, indicators);
+}
 
-    let mut engine = BitSet::EMPTY;
-    if unit.model == Model::Acc1700Can {
-        engine.set(0, plant.filter.has_failed());
-        engine.set(1, plant.filter.is_waiting());
-        engine.set(3, plant.filter.is_regenerating());
-        engine.set(5, plant.filter.needs_a_person());
-        engine.set(7, plant.filter.is_regenerating());
-    }
-    engine.set(8, sequence.status() == Status::Preheat);
-    engine.set(14, plant.load() > 110.0);
+fn engine_indicators(unit: &Acc1700, bank: &mut Bank) {
+    let filter = unit.ecu.as_ref().map(Ecu::shown).unwrap_or_default();
+    let engine_fault = [ECU_SHUTDOWN, ECU_WARNING].into_iter().any(|alarm| unit.alarms.is_active(alarm));
+    let mut engine = unit.alarms.word(FILTER_FAULT.0);
+    engine.set(1, filter.waits);
+    engine.set(2, filter.inhibited);
+    engine.set(3, filter.burns);
+    engine.set(4, filter.by_hand);
+    engine.set(5, filter.needs_a_person);
+    engine.set(7, filter.burns);
+    engine.set(8, unit.sequence.status() == Status::Preheat);
+    engine.set(9, engine_fault);
+    engine.set(14, unit.valve.protects());
     bank.bits(44, engine);
 }
 
 fn sensors(unit: &Acc1700, bank: &mut Bank) {
-    let plant = &unit.plant;
-    let mut sensor = |register: u16, ohm: f64, value: f64| {
-        bank.number(register, ohm);
-        bank.number(register + 1, value.round());
+    let sensors = &unit.readings.sensors;
+    // The model decides what hangs on the first two.
+    let of_a_tank = |percent: f64| sender(percent / 100.0);
+    let (first, second): (Curve, Curve) = match unit.model {
+        Model::Acc1700 => (platinum, |kilopascal| sender(kilopascal / 1000.0)),
+        Model::Acc1700Can => (platinum, |kilopascal| sender(kilopascal / 100.0)),
     };
-    let oil_pressure = plant.engine.oil_pressure * 100.0;
-    sensor(61, sender(plant.tank.percent() / 100.0), plant.tank.percent());
-    sensor(63, platinum(plant.air.temperature), plant.air.temperature);
-    sensor(65, 4.0 + 16.0 * plant.air.pressure / TRANSMITTER, plant.air.pressure);
-    match unit.model {
-        Model::Acc1700 => {
-            sensor(57, platinum(plant.engine.coolant), plant.engine.coolant);
-            sensor(59, sender(oil_pressure / 1000.0), oil_pressure);
+    let curves: [(Curve, f64); 5] = [
+        (first, OPEN_CIRCUIT),
+        (second, OPEN_CIRCUIT),
+        (of_a_tank, OPEN_CIRCUIT),
+        (platinum, OPEN_CIRCUIT),
+        (current, 0.0),
+    ];
+    for ((register, sensor), (curve, open)) in (57..).step_by(2).zip(sensors).zip(curves) {
+        match *sensor {
+            Reading::Value(value) => bank.number(register, curve(value)),
+            Reading::Broken => bank.number(register, open),
+            Reading::Absent => bank.absent(register),
         }
-        Model::Acc1700Can => {
-            sensor(59, sender(plant.air.separator_loss / 100.0), plant.air.separator_loss);
-            bank.absent(57);
-            bank.absent(58);
-        }
+        // Whole units, as the register has them.
+        measured(register + 1, *sensor, bank);
     }
 }
+
+/// From the value of a sensor to what is measured at its terminal.
+type Curve = fn(f64) -> f64;
 
 /// Ohm of a float or pressure sender at a part of its way.
 fn sender(part: f64) -> f64 {
@@ -133,8 +155,22 @@ fn platinum(temperature: f64) -> f64 {
     100.0 * (1.0 + 0.00385 * temperature)
 }
 
-fn ecu(unit: &Acc1700, bank: &mut Bank) {
+/// mA of the transmitter at kPa.
+fn current(pressure: f64) -> f64 {
+    4.0 + 16.0 * pressure / TRANSMITTER
+}
+
+fn measured(register: u16, reading: Reading, bank: &mut Bank) {
+    match reading {
+        Reading::Value(value) => bank.number(register, value.round()),
+        Reading::Absent => bank.absent(register),
+        Reading::Broken => bank.broken(register),
+    }
+}
+
+fn sent_by_the_ecu(unit: &Acc1700, bank: &mut Bank) {
     let plant = &unit.plant;
+    // No ECU here measures the coolant's pressure.
     bank.absent(77);
     let values = [
         plant.coolant_level(),
@@ -155,25 +191,22 @@ fn ecu(unit: &Acc1700, bank: &mut Bank) {
 }
 
 fn measurements(unit: &Acc1700, bank: &mut Bank) {
-    let plant = &unit.plant;
-    bank.number(50, plant.engine.speed);
-    bank.numbers(51, 1, plant.voltages());
-    let values = [
-        plant.engine.coolant,
-        plant.engine.oil_pressure * 100.0,
-        plant.tank.percent(),
-        plant.air.pressure,
-        plant.air.temperature,
-    ];
-    bank.numbers(190, 1, values);
+    let readings = &unit.readings;
+    measured(50, readings.speed, bank);
+    bank.numbers(51, 1, [readings.battery, readings.charger]);
+    let engine = [readings.coolant, readings.oil_pressure, readings.fuel_level];
+    let discharge = [readings.discharge_pressure, readings.discharge_temperature];
+    for (register, reading) in (190..).zip(engine.into_iter().chain(discharge)) {
+        measured(register, reading, bank);
+    }
 }
 
 fn counters(unit: &Acc1700, bank: &mut Bank) {
     let total = unit.running_seconds();
     clock(101, total, bank);
     clock(128, total - unit.run_began, bank);
-    for (register, due) in (COUNTDOWNS..).step_by(3).zip(unit.services_due) {
-        clock(register, due.saturating_sub(total), bank);
+    for (register, left) in (COUNTDOWNS..).step_by(3).zip(unit.services.left(total)) {
+        clock(register, left, bank);
     }
     bank.integer(104, unit.sequence.starts.into());
     // Without an ECU nobody counts litres.
@@ -210,7 +243,7 @@ mod tests {
     fn every_readable_point_is_stored() {
         let profile = busbar_profile::builtin("smartgen-acc1700").unwrap();
         for model in [Model::Acc1700, Model::Acc1700Can] {
-            let unit = Acc1700::new(model, 1, false);
+            let unit = Acc1700::new(profile, model, 1, false);
             let mut clean = Bank::new(profile);
             unit.render(&mut clean);
             for point in profile.points.iter().filter(|point| point.access.is_readable()) {

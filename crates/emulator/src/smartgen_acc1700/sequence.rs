@@ -2,13 +2,9 @@
 
 use std::time::Duration;
 
-use crate::plant::{Compressor, Orders};
+use crate::plant::Orders;
 
-/// kPa below which the load valve opens, and at which it shuts.
-const LOAD_BELOW: f64 = 620.0;
-const UNLOAD_AT: f64 = 750.0;
-/// kPa down to which a stop waits for the discharge pressure.
-const STOP_BELOW: f64 = 200.0;
+use super::setup::Setup;
 
 /// Codes of register 94 (table 13, page 20).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
@@ -32,22 +28,70 @@ pub(super) enum Status {
     AfterStop = 15,
 }
 
-impl Status {
-    /// Seconds until it changes by itself; 0 where it waits for something else. As a site would set them, but for a
-    /// shorter cool-down, so that it can be watched.
-    fn seconds(self) -> u64 {
-        match self {
-            Self::Standby | Self::WaitToOnload | Self::NormalRunning | Self::StopFailure => 0,
-            Self::FuelOutput => 1,
-            Self::EnergiseToStop => 3,
-            Self::Preheat | Self::SafetyOn | Self::AfterStop => 5,
-            Self::Crank => 8,
-            Self::CrankRest | Self::StartIdle | Self::WarmingUp | Self::StopIdle => 10,
-            Self::WaitForStop => 15,
-            Self::Cooling => 20,
-        }
-    }
+/// Why a status changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cause {
+    StartKey,
+    StopKey,
+    LoadKey,
+    /// Some shutdown alarm is active.
+    Shutdown,
+    DelayOver,
+    /// The engine turns by itself.
+    EngineRuns,
+    /// The last crank was in vain.
+    AttemptsOver,
+    EngineStands,
+}
 
+/// Every change of status that there is. What is not here does not happen, and `docs/imitation` draws it.
+pub(super) const TRANSITIONS: &[(Status, Cause, Status)] = {
+    use Cause::*;
+    use Status::*;
+    &[
+        (Standby, StartKey, Preheat),
+        (Preheat, DelayOver, FuelOutput),
+        (Preheat, StopKey, Standby),
+        (Preheat, Shutdown, Standby),
+        (FuelOutput, DelayOver, Crank),
+        (FuelOutput, StopKey, Standby),
+        (FuelOutput, Shutdown, Standby),
+        (Crank, EngineRuns, SafetyOn),
+        (Crank, DelayOver, CrankRest),
+        (Crank, AttemptsOver, EnergiseToStop),
+        (Crank, StopKey, EnergiseToStop),
+        (Crank, Shutdown, EnergiseToStop),
+        (CrankRest, DelayOver, Crank),
+        (CrankRest, StopKey, EnergiseToStop),
+        (CrankRest, Shutdown, EnergiseToStop),
+        (SafetyOn, DelayOver, StartIdle),
+        (SafetyOn, StopKey, StopIdle),
+        (SafetyOn, Shutdown, EnergiseToStop),
+        (StartIdle, DelayOver, WarmingUp),
+        (StartIdle, StopKey, StopIdle),
+        (StartIdle, Shutdown, EnergiseToStop),
+        (WarmingUp, DelayOver, WaitToOnload),
+        (WarmingUp, StopKey, Cooling),
+        (WarmingUp, Shutdown, EnergiseToStop),
+        (WaitToOnload, LoadKey, NormalRunning),
+        (WaitToOnload, StopKey, Cooling),
+        (WaitToOnload, Shutdown, EnergiseToStop),
+        (NormalRunning, LoadKey, WaitToOnload),
+        (NormalRunning, StopKey, Cooling),
+        (NormalRunning, Shutdown, EnergiseToStop),
+        (Cooling, DelayOver, StopIdle),
+        (Cooling, Shutdown, EnergiseToStop),
+        (StopIdle, DelayOver, EnergiseToStop),
+        (StopIdle, Shutdown, EnergiseToStop),
+        (EnergiseToStop, DelayOver, WaitForStop),
+        (WaitForStop, EngineStands, AfterStop),
+        (WaitForStop, DelayOver, StopFailure),
+        (StopFailure, EngineStands, AfterStop),
+        (AfterStop, DelayOver, Standby),
+    ]
+};
+
+impl Status {
     /// The engine turns by itself.
     pub(super) fn is_running(self) -> bool {
         (Self::SafetyOn..=Self::StopIdle).contains(&self)
@@ -57,37 +101,33 @@ impl Status {
     pub(super) fn is_watched(self) -> bool {
         (Self::StartIdle..=Self::StopIdle).contains(&self)
     }
-}
 
-const ATTEMPTS: u8 = 3;
-
-/// What the sequence sees of the plant.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sensed {
-    pub(super) running: bool,
-    pub(super) turning: bool,
-    /// kPa.
-    pub(super) pressure: f64,
-}
-
-impl From<&Compressor> for Sensed {
-    fn from(plant: &Compressor) -> Self {
-        Self {
-            running: plant.engine.is_running(),
-            turning: plant.engine.speed > 0.0,
-            pressure: plant.air.pressure,
-        }
+    /// It ends by itself.
+    fn is_timed(self) -> bool {
+        !matches!(self, Self::Standby | Self::WaitToOnload | Self::NormalRunning | Self::StopFailure)
     }
 }
 
-/// The state machine; keys, time and the plant are handed in.
+/// What the sequence knows of the plant.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sensed {
+    /// The engine is seen to turn by itself.
+    pub(super) running: bool,
+    /// The engine is seen to turn.
+    pub(super) turning: bool,
+    /// kPa at the discharge, where it is known.
+    pub(super) pressure: Option<f64>,
+}
+
+/// The state machine; keys, time and what is measured are handed in.
 #[derive(Clone, Debug)]
 pub(super) struct Sequence {
     status: Status,
     timer: Duration,
     attempts_left: u8,
-    load_valve: bool,
     waits_for_pressure: bool,
+    /// How long it has waited for the pressure.
+    waited: Duration,
     /// Latched until [`Sequence::acknowledge`].
     failed_to_start: bool,
     /// Times the engine ran, since the unit was fitted.
@@ -100,8 +140,8 @@ impl Sequence {
             status: Status::Standby,
             timer: Duration::ZERO,
             attempts_left: 0,
-            load_valve: false,
             waits_for_pressure: false,
+            waited: Duration::ZERO,
             failed_to_start: false,
             starts,
         }
@@ -136,110 +176,71 @@ impl Sequence {
         self.failed_to_start = false;
     }
 
-    /// Starts a unit that stands by; whether it does.
-    pub(super) fn start(&mut self) -> bool {
-        let starts = self.status == Status::Standby;
-        if starts {
-            self.attempts_left = ATTEMPTS;
-            self.enter(Status::Preheat);
+    /// Takes what has come up; whether the status changed by it.
+    pub(super) fn react(&mut self, cause: Cause, setup: &Setup) -> bool {
+        let found = TRANSITIONS.iter().find(|(from, by, _)| *from == self.status && *by == cause);
+        let Some((_, _, next)) = found else { return false };
+        if cause == Cause::StartKey {
+            self.attempts_left = setup.attempts;
         }
-        starts
+        self.failed_to_start |= cause == Cause::AttemptsOver;
+        self.enter(*next, setup);
+        true
     }
 
-    /// Ends whatever runs in an orderly way.
-    pub(super) fn stop(&mut self) {
-        match self.status {
-            Status::Preheat | Status::FuelOutput => self.enter(Status::Standby),
-            Status::Crank | Status::CrankRest => self.enter(Status::EnergiseToStop),
-            Status::SafetyOn | Status::StartIdle => self.enter(Status::StopIdle),
-            Status::WarmingUp | Status::WaitToOnload | Status::NormalRunning => self.enter(Status::Cooling),
-            _ => {}
+    pub(super) fn step(&mut self, dt: Duration, sensed: Sensed, setup: &Setup) {
+        match self.waits(sensed, setup) {
+            true => self.waited += dt,
+            false => self.timer = self.timer.saturating_sub(dt),
         }
+        let mut cause = self.cause(sensed, setup);
+        while let Some(found) = cause {
+            self.react(found, setup);
+            // A status with a delay of 0 is left out; cranks have one, so this ends.
+            let left_out = setup.delay(self.status).is_zero();
+            cause = self.cause(sensed, setup).filter(|_| left_out);
+        }
+        self.waits_for_pressure = self.waits(sensed, setup);
     }
 
-    /// Ends whatever runs at once.
-    pub(super) fn trip(&mut self) {
-        match self.status {
-            Status::Preheat | Status::FuelOutput => self.enter(Status::Standby),
-            status if (Status::Crank..=Status::StopIdle).contains(&status) => {
-                self.enter(Status::EnergiseToStop);
-            }
-            _ => {}
-        }
-    }
-
-    /// Loads a unit that waits for it, and unloads a loaded one.
-    pub(super) fn toggle_load(&mut self, pressure: f64) {
-        match self.status {
-            Status::WaitToOnload => {
-                self.enter(Status::NormalRunning);
-                self.load_valve = pressure < UNLOAD_AT;
-            }
-            Status::NormalRunning => self.enter(Status::WaitToOnload),
-            _ => {}
-        }
-    }
-
-    pub(super) fn step(&mut self, dt: Duration, sensed: Sensed) {
-        self.waits_for_pressure = self.status == Status::Cooling && sensed.pressure > STOP_BELOW;
-        if !self.waits_for_pressure {
-            self.timer = self.timer.saturating_sub(dt);
-        }
-        self.load_valve = self.is_loaded()
-            && (sensed.pressure < LOAD_BELOW || self.load_valve && sensed.pressure < UNLOAD_AT);
-        if let Some(next) = self.next(sensed) {
-            self.failed_to_start |= self.status == Status::Crank && next == Status::EnergiseToStop;
-            self.enter(next);
-        }
-    }
-
-    /// What the unit's outputs do in this status.
+    /// What the unit's relays do in this status; the load valve is another's.
     pub(super) fn orders(&self) -> Orders {
         use Status::*;
         Orders {
             fuel: (FuelOutput..=StopIdle).contains(&self.status),
             starter: self.status == Crank,
             idle: matches!(self.status, SafetyOn | StartIdle | WaitToOnload | StopIdle),
-            load_valve: self.load_valve,
+            load_valve: false,
             blow_down: self.status == Standby || self.status >= Cooling,
         }
     }
 
-    fn next(&self, sensed: Sensed) -> Option<Status> {
-        use Status::*;
-        let elapsed = self.timer.is_zero();
-        let after = |next: Status| elapsed.then_some(next);
+    fn waits(&self, sensed: Sensed, setup: &Setup) -> bool {
+        self.status == Status::Cooling
+            && self.waited < setup.stop_pressure_time
+            && sensed.pressure.is_some_and(|pressure| pressure > setup.stop_pressure)
+    }
+
+    fn cause(&self, sensed: Sensed, setup: &Setup) -> Option<Cause> {
         match self.status {
-            Standby | WaitToOnload | NormalRunning => None,
-            Preheat => after(FuelOutput),
-            FuelOutput => after(Crank),
-            Crank if sensed.running => Some(SafetyOn),
-            Crank if self.attempts_left > 0 => after(CrankRest),
-            Crank => after(EnergiseToStop),
-            CrankRest => after(Crank),
-            SafetyOn => after(StartIdle),
-            StartIdle => after(WarmingUp),
-            WarmingUp => after(WaitToOnload),
-            Cooling => after(StopIdle),
-            StopIdle => after(EnergiseToStop),
-            EnergiseToStop => after(WaitForStop),
-            WaitForStop | StopFailure if !sensed.turning => Some(AfterStop),
-            WaitForStop => after(StopFailure),
-            StopFailure => None,
-            AfterStop => after(Standby),
+            Status::Crank if sensed.running => Some(Cause::EngineRuns),
+            Status::WaitForStop | Status::StopFailure if !sensed.turning => Some(Cause::EngineStands),
+            status if !status.is_timed() || !self.timer.is_zero() || self.waits(sensed, setup) => None,
+            Status::Crank if self.attempts_left == 0 => Some(Cause::AttemptsOver),
+            _ => Some(Cause::DelayOver),
         }
     }
 
-    fn enter(&mut self, next: Status) {
+    fn enter(&mut self, next: Status, setup: &Setup) {
         match next {
             Status::Crank => self.attempts_left = self.attempts_left.saturating_sub(1),
             Status::SafetyOn => self.starts = self.starts.saturating_add(1),
             _ => {}
         }
         self.status = next;
-        self.timer = Duration::from_secs(next.seconds());
-        self.load_valve = false;
+        self.timer = setup.delay(next);
         self.waits_for_pressure = false;
+        self.waited = Duration::ZERO;
     }
 }
 
@@ -249,133 +250,202 @@ mod tests {
     use Status::*;
 
     const TENTH: Duration = Duration::from_millis(100);
-    const DEAD: Sensed = Sensed { running: false, turning: false, pressure: 0.0 };
-    const RUNNING: Sensed = Sensed { running: true, turning: true, pressure: 0.0 };
+    const DEAD: Sensed = Sensed { running: false, turning: false, pressure: Some(0.0) };
+    const RUNNING: Sensed = Sensed { running: true, turning: true, pressure: Some(0.0) };
 
-    /// Every status until one of them is reached.
-    fn walk(sequence: &mut Sequence, to: Status, sensed: impl Fn(Status) -> Sensed) -> Vec<Status> {
-        let mut seen = vec![sequence.status()];
-        for _ in 0..3000 {
-            if seen.last() == Some(&to) {
-                return seen;
-            }
-            sequence.step(TENTH, sensed(sequence.status()));
-            if seen.last() != Some(&sequence.status()) {
-                seen.push(sequence.status());
-            }
-        }
-        panic!("{to:?} never came: {seen:?}");
+    /// A sequence with what it is set to.
+    struct Bench {
+        sequence: Sequence,
+        setup: Setup,
     }
 
-    fn loaded() -> Sequence {
-        let mut sequence = Sequence::new(10);
-        assert!(sequence.start());
-        walk(&mut sequence, WaitToOnload, |_| RUNNING);
-        sequence.toggle_load(0.0);
-        sequence
+    impl Bench {
+        fn new(changes: &[(&str, &str)]) -> Self {
+            Self { sequence: Sequence::new(10), setup: Setup::with(changes) }
+        }
+
+        fn loaded() -> Self {
+            let mut bench = Self::new(&[]);
+            assert!(bench.react(Cause::StartKey));
+            bench.walk(WaitToOnload, |_| RUNNING);
+            assert!(bench.react(Cause::LoadKey));
+            bench
+        }
+
+        fn react(&mut self, cause: Cause) -> bool {
+            self.sequence.react(cause, &self.setup)
+        }
+
+        fn step(&mut self, sensed: Sensed) {
+            self.sequence.step(TENTH, sensed, &self.setup);
+        }
+
+        fn status(&self) -> Status {
+            self.sequence.status()
+        }
+
+        /// Every status until one of them is reached.
+        fn walk(&mut self, to: Status, sensed: impl Fn(Status) -> Sensed) -> Vec<Status> {
+            let mut seen = vec![self.status()];
+            for _ in 0..3000 {
+                if seen.last() == Some(&to) {
+                    return seen;
+                }
+                self.step(sensed(self.status()));
+                if seen.last() != Some(&self.status()) {
+                    seen.push(self.status());
+                }
+            }
+            panic!("{to:?} never came: {seen:?}");
+        }
+    }
+
+    #[test]
+    fn the_table_knows_every_status_and_no_two_ways_for_one_cause() {
+        for (index, (from, cause, to)) in TRANSITIONS.iter().enumerate() {
+            assert_ne!(from, to);
+            let twins = TRANSITIONS[index + 1..].iter().filter(|other| (other.0, other.1) == (*from, *cause));
+            assert_eq!(twins.count(), 0, "{from:?} {cause:?}");
+        }
+        let mut reached = vec![Standby];
+        while let Some((_, _, next)) =
+            TRANSITIONS.iter().find(|(from, _, to)| reached.contains(from) && !reached.contains(to))
+        {
+            reached.push(*next);
+        }
+        assert_eq!(reached.len(), 16, "{reached:?}");
+        for status in reached {
+            let ways = |wanted: Cause| {
+                TRANSITIONS.iter().any(|(from, cause, _)| (*from, *cause) == (status, wanted))
+            };
+            assert_eq!(ways(Cause::DelayOver), status.is_timed(), "{status:?}");
+            let stoppable = (Crank..=StopIdle).contains(&status) || matches!(status, Preheat | FuelOutput);
+            assert_eq!(ways(Cause::Shutdown), stoppable, "{status:?}");
+        }
     }
 
     #[test]
     fn it_starts_on_the_third_attempt_in_the_order_of_the_codes() {
-        let mut sequence = Sequence::new(10);
-        assert!(sequence.start() && !sequence.start());
+        let mut bench = Bench::new(&[]);
+        assert!(bench.react(Cause::StartKey) && !bench.react(Cause::StartKey));
         let cranked = std::cell::Cell::new(0);
-        let seen = walk(&mut sequence, WaitToOnload, |status| {
+        let seen = bench.walk(WaitToOnload, |status| {
             cranked.set(cranked.get() + u32::from(status == Crank));
             if cranked.get() > 170 { RUNNING } else { DEAD }
         });
-        assert_eq!(
-            seen,
-            [
-                Preheat,
-                FuelOutput,
-                Crank,
-                CrankRest,
-                Crank,
-                CrankRest,
-                Crank,
-                SafetyOn,
-                StartIdle,
-                WarmingUp,
-                WaitToOnload
-            ]
-        );
-        assert_eq!(sequence.starts, 11);
+        let attempts = [Crank, CrankRest, Crank, CrankRest, Crank];
+        let running = [SafetyOn, StartIdle, WarmingUp, WaitToOnload];
+        assert_eq!(seen, [&[Preheat, FuelOutput][..], &attempts, &running].concat());
+        assert_eq!(bench.sequence.starts, 11);
     }
 
     #[test]
-    fn three_attempts_and_it_gives_up() {
-        let mut sequence = Sequence::new(10);
-        sequence.start();
-        let seen = walk(&mut sequence, Standby, |_| DEAD);
-        assert_eq!(seen.iter().filter(|status| **status == Crank).count(), 3);
-        assert_eq!(seen[seen.len() - 4..], [EnergiseToStop, WaitForStop, AfterStop, Standby]);
-        assert!(sequence.failed_to_start());
-        assert_eq!(sequence.starts, 10);
-        sequence.acknowledge();
-        assert!(!sequence.failed_to_start());
+    fn its_attempts_are_used_up_and_it_gives_up() {
+        for attempts in [1, 3, 10] {
+            let mut bench = Bench::new(&[("start_attempts", &attempts.to_string())]);
+            bench.react(Cause::StartKey);
+            let seen = bench.walk(Standby, |_| DEAD);
+            assert_eq!(seen.iter().filter(|status| **status == Crank).count(), attempts);
+            assert_eq!(seen[seen.len() - 4..], [EnergiseToStop, WaitForStop, AfterStop, Standby]);
+            assert!(bench.sequence.failed_to_start());
+            assert_eq!(bench.sequence.starts, 10);
+            bench.sequence.acknowledge();
+            assert!(!bench.sequence.failed_to_start());
+        }
     }
 
     #[test]
     fn a_stop_while_cranking_is_no_failure() {
-        let mut sequence = Sequence::new(10);
-        sequence.start();
-        walk(&mut sequence, Crank, |_| DEAD);
-        sequence.stop();
-        walk(&mut sequence, Standby, |_| DEAD);
-        assert!(!sequence.failed_to_start());
-    }
-
-    #[test]
-    fn the_valve_hunts_between_its_limits_and_the_status_stays() {
-        let mut sequence = loaded();
-        let mut valve = |pressure| {
-            sequence.step(TENTH, Sensed { pressure, ..RUNNING });
-            assert_eq!(sequence.status(), NormalRunning);
-            sequence.orders().load_valve
-        };
-        let pressures = [0.0, 700.0, 749.0, 750.0, 700.0, 620.0, 619.0, 700.0, 800.0];
-        assert_eq!(pressures.map(&mut valve), [true, true, true, false, false, false, true, true, false]);
+        let mut bench = Bench::new(&[]);
+        bench.react(Cause::StartKey);
+        bench.walk(Crank, |_| DEAD);
+        bench.react(Cause::StopKey);
+        bench.walk(Standby, |_| DEAD);
+        assert!(!bench.sequence.failed_to_start());
     }
 
     #[test]
     fn a_stop_waits_for_the_pressure_with_its_delay_standing_still() {
-        let mut sequence = loaded();
-        sequence.stop();
-        assert!(!sequence.orders().load_valve && sequence.orders().blow_down);
+        let mut bench = Bench::loaded();
+        bench.react(Cause::StopKey);
+        assert!(bench.sequence.orders().blow_down);
         for _ in 0..300 {
-            sequence.step(TENTH, Sensed { pressure: 201.0, ..RUNNING });
-            assert_eq!((sequence.status(), sequence.seconds_left()), (Cooling, 20));
-            assert!(sequence.waits_for_pressure());
+            bench.step(Sensed { pressure: Some(201.0), ..RUNNING });
+            assert_eq!((bench.status(), bench.sequence.seconds_left()), (Cooling, 20));
+            assert!(bench.sequence.waits_for_pressure());
         }
-        sequence.step(TENTH, Sensed { pressure: 199.0, ..RUNNING });
-        assert!(!sequence.waits_for_pressure());
-        let seen = walk(&mut sequence, Standby, |status| if status < WaitForStop { RUNNING } else { DEAD });
+        bench.step(Sensed { pressure: Some(199.0), ..RUNNING });
+        assert!(!bench.sequence.waits_for_pressure());
+        let seen = bench.walk(Standby, |status| if status < WaitForStop { RUNNING } else { DEAD });
         assert_eq!(seen, [Cooling, StopIdle, EnergiseToStop, WaitForStop, AfterStop, Standby]);
     }
 
     #[test]
+    fn a_stop_waits_no_longer_than_it_is_set_to() {
+        let mut bench = Bench::loaded();
+        bench.setup = Setup::with(&[("stop_pressure_time", "60")]);
+        bench.react(Cause::StopKey);
+        for _ in 0..600 {
+            bench.step(Sensed { pressure: Some(700.0), ..RUNNING });
+        }
+        assert_eq!((bench.status(), bench.sequence.seconds_left()), (Cooling, 20));
+        for _ in 0..50 {
+            bench.step(Sensed { pressure: Some(700.0), ..RUNNING });
+        }
+        assert_eq!((bench.status(), bench.sequence.seconds_left()), (Cooling, 15));
+        assert!(!bench.sequence.waits_for_pressure());
+    }
+
+    #[test]
+    fn a_stop_waits_for_no_pressure_that_nobody_knows() {
+        let mut bench = Bench::loaded();
+        bench.react(Cause::StopKey);
+        for _ in 0..10 {
+            bench.step(Sensed { pressure: None, ..RUNNING });
+        }
+        assert_eq!((bench.sequence.seconds_left(), bench.sequence.waits_for_pressure()), (19, false));
+    }
+
+    #[test]
+    fn statuses_without_a_delay_are_left_out_but_the_wait_for_the_pressure_is_not() {
+        let nothing =
+            ["preheat_time", "fuel_output_time", "safety_on_time", "start_idle_time", "warming_up_time"];
+        let stopping = ["cooling_time", "stop_idle_time", "energise_to_stop_time", "after_stop_time"];
+        let changes: Vec<_> = nothing.iter().chain(&stopping).map(|id| (*id, "0")).collect();
+        let mut bench = Bench::new(&changes);
+        bench.react(Cause::StartKey);
+        assert_eq!(bench.walk(WaitToOnload, |_| RUNNING), [Preheat, Crank, WaitToOnload]);
+        bench.react(Cause::LoadKey);
+        bench.react(Cause::StopKey);
+        for _ in 0..50 {
+            bench.step(Sensed { pressure: Some(300.0), ..RUNNING });
+            assert_eq!(bench.status(), Cooling);
+        }
+        assert_eq!(bench.walk(WaitForStop, |_| RUNNING), [Cooling, WaitForStop]);
+        assert_eq!(bench.walk(Standby, |_| DEAD), [WaitForStop, Standby]);
+    }
+
+    #[test]
     fn an_engine_that_goes_on_turning_is_a_stop_failure_until_it_stands() {
-        let mut sequence = loaded();
-        sequence.trip();
-        let seen = walk(&mut sequence, StopFailure, |_| RUNNING);
+        let mut bench = Bench::loaded();
+        bench.react(Cause::Shutdown);
+        let seen = bench.walk(StopFailure, |_| RUNNING);
         assert_eq!(seen, [EnergiseToStop, WaitForStop, StopFailure]);
         for _ in 0..600 {
-            sequence.step(TENTH, RUNNING);
+            bench.step(RUNNING);
         }
-        assert_eq!((sequence.status(), sequence.seconds_left()), (StopFailure, 0));
-        assert!(!sequence.orders().fuel && !sequence.start());
-        assert_eq!(walk(&mut sequence, Standby, |_| DEAD), [StopFailure, AfterStop, Standby]);
+        assert_eq!((bench.status(), bench.sequence.seconds_left()), (StopFailure, 0));
+        assert!(!bench.sequence.orders().fuel && !bench.react(Cause::StartKey));
+        assert_eq!(bench.walk(Standby, |_| DEAD), [StopFailure, AfterStop, Standby]);
     }
 
     #[test]
     fn the_load_key_is_dead_where_nothing_could_be_loaded() {
         for status in [Standby, Crank, StartIdle, WarmingUp, Cooling, StopIdle, AfterStop] {
-            let mut sequence = Sequence::new(10);
-            sequence.enter(status);
-            sequence.toggle_load(0.0);
-            assert_eq!(sequence.status(), status);
-            assert!(!sequence.orders().load_valve);
+            let mut bench = Bench::new(&[]);
+            bench.sequence.enter(status, &bench.setup);
+            assert!(!bench.react(Cause::LoadKey));
+            assert_eq!(bench.status(), status);
         }
     }
 }

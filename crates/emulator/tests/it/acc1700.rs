@@ -1,6 +1,9 @@
 //! The imitated ACC1700: worked frames, wire rules, keys and the two procedures of its manual.
 
+mod alarms;
 mod life;
+mod plant;
+mod settings;
 
 use std::time::Duration;
 

@@ -2,15 +2,19 @@
 #![cfg(test)]
 
 mod acc1700;
+mod control;
+mod datakom_d;
 mod dkg705;
 mod golden;
 mod hat821si;
 mod identities;
 #[cfg(target_os = "linux")]
 mod lines;
+mod openapi;
 mod pins;
 mod prop;
 mod push_buttons;
+mod scenarios;
 mod server;
 mod site;
 mod wire_rules;

@@ -15,6 +15,8 @@ use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema,
 use utoipa::openapi::{RefOr, schema};
 use utoipa::{PartialSchema, ToSchema};
 
+use crate::gateway::Beside;
+
 pub use self::diagram::{ConnectionView, DiagramView, NodeKind, NodeView};
 pub use self::event::{AlarmsEvent, ResumedEvent, SnapshotEvent, StateEvent, ValuesEvent};
 pub use self::wire::{
@@ -41,6 +43,25 @@ pub struct SiteInfo {
     pub revision: u64,
     /// Which site file runs.
     pub config: ConfigView,
+    /// What else is served here that has a page of its own.
+    pub beside: Vec<BesideView>,
+}
+
+/// Something that is served beside the gateway.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct BesideView {
+    /// What it is called.
+    #[schema(examples("Imitation"))]
+    pub name: String,
+    /// Its page, seen from this one.
+    #[schema(examples("imitation/"))]
+    pub path: String,
+}
+
+impl BesideView {
+    pub(crate) fn of(beside: &Beside) -> Self {
+        Self { name: beside.name.clone(), path: format!("{}/", beside.folder) }
+    }
 }
 
 /// The site file that runs, and the one that was refused.

@@ -13,8 +13,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
-use axum::http::header;
+use axum::http::{StatusCode, header};
 use axum::middleware::{from_fn, from_fn_with_state};
+use axum::routing::get;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
@@ -29,6 +30,7 @@ use self::places::{Activity, Places};
 use self::refusal::Worded;
 use self::streams::{Peer, Streams};
 use crate::api;
+use crate::gateway::Beside;
 use crate::hub::Hub;
 use crate::page;
 use crate::patience::Patient;
@@ -50,6 +52,8 @@ pub(crate) struct Service {
     pub(crate) address: SocketAddr,
     /// None: those of this process.
     pub(crate) limits: Option<Limits>,
+    /// What is served besides.
+    pub(crate) beside: Vec<Beside>,
 }
 
 /// Serves until the gateway ends.
@@ -58,7 +62,8 @@ pub(crate) async fn serve(service: Service, hub: Arc<Hub>) {
     let limits = service.limits.unwrap_or_else(|| Limits::with_handles(limits::handles(), wires));
     let stop = hub.stop();
     let known = Known { address: service.address.ip(), hub: Arc::clone(&hub) };
-    accept(service.listener, router(hub, known, &limits), limits, stop).await;
+    let routes = router(hub, &limits).merge(beside(service.beside));
+    accept(service.listener, guard::guarded(routes, known), limits, stop).await;
 }
 
 async fn accept(listener: TcpListener, router: Router, limits: Limits, stop: Stop) {
@@ -137,8 +142,8 @@ async fn connection(
     }
 }
 
-/// Everything that is served.
-fn router(hub: Arc<Hub>, known: Known, limits: &Limits) -> Router {
+/// The API and the page.
+fn router(hub: Arc<Hub>, limits: &Limits) -> Router {
     let waiting = guard::waiting(limits);
     let document = page::document(Arc::clone(&hub))
         .layer(from_fn_with_state(Arc::clone(&waiting), guard::weighed))
@@ -150,7 +155,16 @@ fn router(hub: Arc<Hub>, known: Known, limits: &Limits) -> Router {
         .layer(from_fn_with_state(Streams::new(limits.streams), guard::counted))
         .layer(header_unless_set(header::CACHE_CONTROL, "no-store"))
         .layer(header_unless_set(header::VARY, "accept-encoding"));
-    guard::guarded(Router::new().merge(api).merge(document).merge(page::files()), known)
+    Router::new().merge(api).merge(document).merge(page::files())
+}
+
+/// What is served besides, each below its folder; its page finds its own files there.
+fn beside(beside: Vec<Beside>) -> Router {
+    beside.into_iter().fold(Router::new(), |router, Beside { folder, routes, .. }| {
+        let within = format!("{folder}/");
+        let moved = get(async move || ([(header::LOCATION, within)], StatusCode::PERMANENT_REDIRECT));
+        router.route(&format!("/{folder}"), moved).nest_service(&format!("/{folder}/"), routes)
+    })
 }
 
 #[cfg(test)]
@@ -176,7 +190,7 @@ mod tests {
         let address = listener.local_addr().unwrap();
         let hub = Arc::new(crate::testing::hub(&[], stop));
         let limits = Limits { connections: 3, ..Limits::default() };
-        let service = Service { listener, address, limits: Some(limits) };
+        let service = Service { listener, address, limits: Some(limits), beside: Vec::new() };
         let server = tokio::spawn(serve(service, hub));
         let mut first = ask(address).await;
         let mut second = ask(address).await;

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod bad_line;
+mod beside;
 mod events;
 mod faults;
 mod hostile;

@@ -88,7 +88,7 @@ pub(crate) async fn start(site: &str) -> (Gateway, Client) {
     start_with(site, Options::default()).await
 }
 
-async fn start_with(site: &str, options: Options) -> (Gateway, Client) {
+pub(crate) async fn start_with(site: &str, options: Options) -> (Gateway, Client) {
     let site = Site::parse("bench.toml", site).unwrap();
     let gateway = busbar_gateway::start(site, options).await.unwrap();
     let client = Client::new(gateway.address());

@@ -1,0 +1,43 @@
+//! `--control`: the imitation's own API and page, beside what it imitates.
+
+use std::{env, net::SocketAddr};
+
+use busbar_emulator::{
+    Emulation,
+    control::{self, Control, Imitated, ServeError, Server, Token},
+};
+
+use crate::failure::Failure;
+
+/// Where the token comes from. What stands on a command line every user of the machine can read.
+pub(super) const TOKEN: &str = "BUSBAR_CONTROL_TOKEN";
+
+/// The token of the environment, if there is one.
+pub(super) fn token() -> Result<Option<Token>, Failure> {
+    let Some(text) = env::var_os(TOKEN).filter(|text| !text.is_empty()) else { return Ok(None) };
+    match text.to_str().map(Token::new) {
+        Some(Ok(token)) => Ok(Some(token)),
+        Some(Err(error)) => Err(Failure::Call(format!("{TOKEN} holds no token: {error}"))),
+        None => Err(Failure::Call(format!("{TOKEN} holds no text"))),
+    }
+}
+
+/// The control of what `busbar emulate` imitates.
+pub(super) async fn serve(
+    address: SocketAddr,
+    emulation: &Emulation,
+    token: Option<Token>,
+) -> Result<Server, Failure> {
+    let imitated = emulation.controllers().iter().map(|controller| {
+        let (id, name) = controller.with(|device| {
+            let profile = device.profile();
+            (profile.key.clone(), format!("{} {}", profile.vendor, device.model()))
+        });
+        Imitated { id, name, controller: controller.clone() }
+    });
+    let control = Control { imitated: imitated.collect(), token, site: None };
+    control::serve(address, control).await.map_err(|error| match error {
+        ServeError::NoToken { .. } => Failure::Call(format!("{error} in {TOKEN}")),
+        _ => Failure::Failed(format!("{error} (--control ADDR:PORT)")),
+    })
+}

@@ -1,0 +1,204 @@
+//! A scenario file as a whole: its head, then its steps.
+
+use std::time::Duration;
+
+use busbar_profile::{DateTime, Findings, Profile, builtin, builtins, nearest};
+use toml::de::DeTable;
+
+use super::step::Stage;
+use super::text::shown;
+use super::values::{Entry, Notes, entries};
+use super::{Scenario, Step};
+use crate::config::Config;
+use crate::device::Device;
+
+const FILE: [&str; 2] = ["scenario", "steps"];
+const HEAD: [&str; 8] = ["title", "about", "controller", "model", "seed", "clock", "lasts", "settings"];
+
+const USUAL: Duration = Duration::from_secs(3600);
+/// A fortnight.
+const LONGEST: Duration = Duration::from_secs(14 * 86_400);
+const SHORTEST: Duration = Duration::from_secs(1);
+
+pub(super) fn scenario(file: &str, text: &str) -> Result<Scenario, Findings> {
+    let mut notes = Notes::new(file, text);
+    let (root, errors) = DeTable::parse_recoverable(text);
+    for error in errors {
+        let span = error.span().unwrap_or(0..0);
+        let message = error.message().replace('\n', ", ");
+        notes.add(span.clone(), format!("this is not TOML: {message}"), syntax_help(text, span.start));
+    }
+    if !notes.is_clean() {
+        // After a syntax error the rest of the text means who knows what.
+        notes.finish()?;
+        notes = Notes::new(file, text);
+    }
+    let scenario = read(file, root.get_ref(), &mut notes);
+    notes.finish()?;
+    // Without a finding there is a scenario; an empty one plays to its end at once.
+    Ok(scenario.unwrap_or_else(|| nothing(file)))
+}
+
+/// What to do about a value that TOML does not understand.
+fn syntax_help(text: &str, at: usize) -> &'static str {
+    let before = text.get(..at).unwrap_or(text).trim_end_matches(|c: char| c.is_alphanumeric());
+    match before.trim_end().ends_with('=') {
+        true => "put texts and durations in quotes, such as mains = \"failed\" or at = \"10s\"",
+        false => "mend the syntax; https://toml.io shows it",
+    }
+}
+
+fn read(file: &str, root: &DeTable<'_>, notes: &mut Notes<'_>) -> Option<Scenario> {
+    let (mut head, mut steps) = (None, None);
+    for entry in entries(root) {
+        match entry.key.as_str() {
+            "scenario" => head = Some(entry),
+            "steps" => steps = Some(entry),
+            _ => notes.unknown_key(&entry, "a scenario file", &FILE),
+        }
+    }
+    let Some(head) = head else {
+        let help = "begin the file with [scenario], title = \"Mains failure\" and controller = \"datakom-d\"";
+        notes.add(0..0, "there is no [scenario]", help);
+        return None;
+    };
+    let (mut scenario, probe) = self::head(file, &head, notes)?;
+    let Some(steps) = steps else {
+        let help = "add [[steps]] with at = \"10s\" and what happens then, such as mains = \"failed\"";
+        notes.add(head.span, "this scenario has no steps", help);
+        return None;
+    };
+    scenario.steps = self::steps(&scenario, probe, &steps, notes);
+    Some(scenario)
+}
+
+/// The head, and a device of its kind to hold the steps against.
+fn head(file: &str, head: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<(Scenario, Device)> {
+    let mut scenario = nothing(file);
+    let (mut controller, mut model, mut settings) = (None, None, None);
+    let mut titled = false;
+    for entry in notes.table(head)? {
+        match entry.key.as_str() {
+            "title" => {
+                titled = true;
+                scenario.title = title(&entry, notes).unwrap_or_default();
+            }
+            "about" => scenario.about = notes.text(&entry),
+            "controller" => controller = Some(entry),
+            "model" => model = Some(entry),
+            "seed" => scenario.seed = notes.whole(&entry).unwrap_or_default(),
+            "clock" => scenario.clock = clock(&entry, notes).unwrap_or(scenario.clock),
+            "lasts" => scenario.lasts = notes.duration(&entry, SHORTEST..=LONGEST).unwrap_or(USUAL),
+            "settings" => settings = Some(entry),
+            _ => notes.unknown_key(&entry, "[scenario]", &HEAD),
+        }
+    }
+    if !titled {
+        notes.missing(head.span.clone(), "[scenario]", "title", "\"Mains failure\"");
+    }
+    let Some(controller) = controller else {
+        notes.missing(head.span.clone(), "[scenario]", "controller", "\"datakom-d\"");
+        return None;
+    };
+    scenario.profile = profile(&controller, notes)?;
+    if let Some(entry) = &model {
+        scenario.model = Some(notes.text(entry)?);
+    }
+    let mut probe = match Device::new(&scenario.stage()) {
+        Ok(probe) => probe,
+        Err(error) => {
+            notes.add_error(model.as_ref().unwrap_or(&controller).value.span(), &error);
+            return None;
+        }
+    };
+    for entry in settings.and_then(|settings| notes.table(&settings)).unwrap_or_default() {
+        if let Some(value) = setting(&mut probe, &entry, notes) {
+            scenario.settings.push((entry.key, value));
+        }
+    }
+    Some((scenario, probe))
+}
+
+/// A setting and what it is set to, if the controller can be set so.
+pub(super) fn setting(probe: &mut Device, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<String> {
+    let value = match entry.value.get_ref().as_bool() {
+        Some(yes) => u8::from(yes).to_string(),
+        None => notes.plain(entry)?,
+    };
+    match probe.set(&entry.key, &value) {
+        Ok(()) => Some(value),
+        Err(error) => {
+            notes.add_error(entry.span.clone(), &error);
+            None
+        }
+    }
+}
+
+fn profile(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<&'static Profile> {
+    let key = notes.text(entry)?;
+    let found = builtin(&key);
+    if found.is_none() {
+        let keys: Vec<_> = builtins().iter().map(|profile| profile.key.as_str()).collect();
+        let help = match nearest(&key, keys.iter().copied()) {
+            Some(key) => format!("did you mean `{key}`?"),
+            None => format!("write one of: {}", keys.join(", ")),
+        };
+        notes.add(entry.value.span(), format!("there is no controller `{}`", shown(&key)), help);
+    }
+    found
+}
+
+fn clock(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<DateTime> {
+    let text = notes.text(entry)?;
+    let clock = text.parse().ok();
+    if clock.is_none() {
+        let help = "write a local time, such as \"2026-01-05T10:00:00\"";
+        notes.add(entry.value.span(), format!("`{}` is no date with a time", shown(&text)), help);
+    }
+    clock
+}
+
+fn title(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<String> {
+    let title = notes.text(entry)?;
+    let fits = (1..=100).contains(&title.trim().chars().count()) && !title.contains(char::is_control);
+    if !fits {
+        notes.add(entry.value.span(), "this is no title", "write 1 to 100 characters on one line");
+    }
+    fits.then(|| title.trim().to_owned())
+}
+
+fn steps(scenario: &Scenario, probe: Device, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Vec<Step> {
+    let tables = entry.value.get_ref().as_array();
+    let Some(tables) = tables.filter(|tables| !tables.is_empty()) else {
+        notes.wrong_type::<()>(entry, "a list of tables, each headed [[steps]]");
+        return Vec::new();
+    };
+    let mut stage = Stage::new(scenario.profile, probe, scenario.clock, scenario.lasts);
+    let mut steps = Vec::new();
+    for item in tables.iter() {
+        match item.get_ref().as_table() {
+            Some(table) => steps.extend(stage.step(table, item.span(), notes)),
+            None => {
+                notes.wrong_type::<()>(entry, "a list of tables, each headed [[steps]]");
+            }
+        }
+    }
+    steps
+}
+
+/// A scenario before anything is known of it.
+fn nothing(file: &str) -> Scenario {
+    let Config { seed, epoch, .. } = Config::default();
+    Scenario {
+        file: file.to_owned(),
+        title: String::new(),
+        about: None,
+        profile: &builtins()[0],
+        model: None,
+        seed,
+        clock: epoch,
+        settings: Vec::new(),
+        lasts: USUAL,
+        steps: Vec::new(),
+    }
+}

@@ -1,0 +1,141 @@
+//! What can be done.
+
+use axum::http::Method;
+use busbar_emulator::{Config, Device};
+use serde_json::json;
+
+use super::Bench;
+
+#[tokio::test]
+async fn controllers_say_what_they_are() {
+    let bench = Bench::new().await;
+    let all = bench.get("/api/v1/controllers").await;
+    assert_eq!(all.as_array().unwrap().len(), 2);
+    let one = bench.get("dkg").await;
+    let said = ["name", "profile", "vendor", "model", "kind", "unit", "seed"].map(|key| one[key].clone());
+    assert_eq!(
+        said,
+        [
+            json!("Genset 2"),
+            json!("datakom-dkg705"),
+            json!("Datakom"),
+            json!("DKG-705"),
+            json!("genset"),
+            json!(2),
+            json!(1)
+        ]
+    );
+    assert_eq!(one["endpoints"], json!([bench.emulation.urls()[0].to_string()]));
+    assert_eq!((&one["clock"]["speed"], &one["clock"]["paused"]), (&json!(1.0), &json!(false)));
+    assert_eq!((&one["injected"], &one["pinned"]), (&json!([]), &json!([])));
+    assert_eq!(bench.get("d").await["model"], "D-500");
+}
+
+#[tokio::test]
+async fn a_paused_clock_stands_still_and_is_stepped() {
+    let bench = Bench::new().await;
+    assert_eq!(bench.put("d/clock", json!({ "paused": true, "speed": 60 })).await.json()["paused"], true);
+    let before = bench.get("d").await["clock"]["time_s"].as_f64().unwrap();
+    tokio::time::sleep(busbar_emulator::STEP * 3).await;
+    let clock = bench.get("d").await["clock"].clone();
+    assert_eq!(clock, json!({ "time_s": before, "speed": 60.0, "paused": true }));
+    let stepped = bench.ask(Method::POST, "d/steps", Some(json!({ "seconds": 90.5 }))).await.json();
+    assert!((stepped["time_s"].as_f64().unwrap() - before - 90.5).abs() < 0.101, "{stepped}");
+    assert_eq!(bench.get("dkg").await["clock"]["paused"], false, "each has its own");
+    assert_eq!(bench.put("d/clock", json!({ "paused": false })).await.json()["speed"], 60.0);
+}
+
+#[tokio::test]
+async fn a_run_by_steps_is_the_run_of_its_seed() {
+    let bench = Bench::new().await;
+    bench.step(123.0).await;
+    let config = Config { profile: "datakom-dkg705".into(), unit: 2, ..Config::default() };
+    let mut twin = Device::new(&config).unwrap();
+    bench.emulation.controllers()[1].with(|device| {
+        twin.advance(device.time());
+        assert_eq!(twin.time(), device.time());
+        for point in device.profile().points.iter().filter(|point| point.access.is_readable()) {
+            let registers =
+                |device: &Device| device.registers(point.address, point.registers).unwrap().to_vec();
+            assert_eq!(registers(device), registers(&twin), "{}", point.id);
+        }
+    });
+}
+
+#[tokio::test]
+async fn a_pulled_lever_acts_on_the_plant() {
+    let bench = Bench::new().await;
+    bench.step(1.0).await;
+    assert!(bench.value("dkg", "mains.l1.voltage").await.as_f64().unwrap() > 200.0);
+    let mains = bench.put("dkg/levers/mains", json!({ "position": "failed" })).await.json();
+    assert_eq!((&mains["id"], &mains["position"]), (&json!("mains"), &json!("failed")));
+    bench.step(2.0).await;
+    assert_eq!(bench.value("dkg", "mains.l1.voltage").await, 0);
+    let levers = bench.get("dkg/levers").await;
+    assert!(levers.as_array().unwrap().contains(&mains), "{levers}");
+    assert!(bench.value("d", "mains.l1.voltage").await.as_f64().unwrap() > 200.0, "of the other plant");
+}
+
+#[tokio::test]
+async fn points_are_pinned_and_let_go() {
+    let bench = Bench::new().await;
+    bench.step(1.0).await;
+    let free = bench.value("d", "battery.voltage").await;
+    let pins = bench.put("d/pins/battery_voltage", json!({ "value": 11.5 })).await.json();
+    assert_eq!(pins[0]["point"], "battery_voltage");
+    assert_eq!((&pins[0]["value"], &pins), (&json!("11.5"), &bench.get("d/pins").await));
+    bench.put("d/pins/operation_status", json!({ "value": "at_rest" })).await.json();
+    assert_eq!(bench.value("d", "battery.voltage").await, 11.5);
+    assert_eq!(bench.get("d").await["pinned"].as_array().unwrap().len(), 2);
+    let left = bench.delete("d/pins/battery_voltage").await.json();
+    assert_eq!(left.as_array().unwrap().len(), 1);
+    assert_eq!(bench.value("d", "battery.voltage").await, free);
+    assert_eq!(bench.delete("d/pins/battery_voltage").await.json(), left, "it was let go already");
+}
+
+#[tokio::test]
+async fn settings_are_read_and_set() {
+    let bench = Bench::new().await;
+    for id in ["d", "dkg"] {
+        for setting in bench.get(&format!("{id}/settings")).await.as_array().unwrap() {
+            let (name, most) = (setting["id"].as_str().unwrap(), &setting["max"]);
+            let settings = bench.put(&format!("{id}/settings/{name}"), json!({ "value": most })).await.json();
+            let now = settings.as_array().unwrap().iter().find(|one| one["id"] == name).unwrap();
+            assert_eq!(&now["value"], most, "{id} {name}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn every_alarm_is_listed_with_those_that_are_injected() {
+    let bench = Bench::new().await;
+    for id in ["d", "dkg"] {
+        let alarms = bench.get(&format!("{id}/alarms")).await;
+        let known =
+            bench.emulation.controllers()[usize::from(id == "dkg")].with(|device| device.alarms().count());
+        assert_eq!(alarms.as_array().unwrap().len(), known);
+        assert!(alarms.as_array().unwrap().iter().all(|alarm| alarm["injected"] == false));
+        assert_eq!(bench.get(id).await["injected"], json!([]));
+    }
+}
+
+#[tokio::test]
+async fn values_are_what_clients_read() {
+    let bench = Bench::new().await;
+    let names = "state.engine,mode,breaker.mains.closed,genset.frequency,unit_mode";
+    let values = bench.get(&format!("d/values?name={names}")).await;
+    let said: Vec<_> = values.as_array().unwrap().iter().map(|one| (&one["name"], &one["value"])).collect();
+    assert_eq!(
+        said,
+        [
+            (&json!("state.engine"), &json!("stopped")),
+            (&json!("mode"), &json!("auto")),
+            (&json!("breaker.mains.closed"), &json!(true)),
+            (&json!("genset.frequency"), &json!(0)),
+            (&json!("unit_mode"), &json!("auto")),
+        ]
+    );
+    assert_eq!((&values[3]["unit"], &values[0]["unit"]), (&json!("Hz"), &json!(null)));
+    let every = bench.get("d/values").await;
+    assert!(every.as_array().unwrap().len() > 100, "every signal that it has");
+}

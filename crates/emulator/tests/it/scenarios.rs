@@ -1,0 +1,87 @@
+//! Every scenario that is shipped, played to its end: each is a test of the controller that it is for.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use busbar_emulator::{Report, Scenario};
+
+/// A test a file, named like it.
+macro_rules! scenarios {
+    ($($name:ident: $file:literal,)+) => {
+        $(
+            #[test]
+            fn $name() {
+                holds($file);
+            }
+        )+
+
+        const PLAYED: &[&str] = &[$($file),+];
+    };
+}
+
+scenarios! {
+    mains_failure_and_return: "mains-failure.toml",
+    short_dip_that_must_not_start: "short-dip.toml",
+    start_on_the_third_attempt: "third-attempt.toml",
+    fail_to_start: "fail-to-start.toml",
+    low_oil_pressure_shutdown: "low-oil-pressure.toml",
+    overheating: "overheating.toml",
+    overload_load_dump: "overload.toml",
+    breaker_that_will_not_close: "breaker-will-not-close.toml",
+    fuel_running_out: "fuel-running-out.toml",
+    battery_dying: "battery-dying.toml",
+    weekly_test_under_load: "weekly-test.toml",
+    emergency_stop: "emergency-stop.toml",
+    remote_start: "remote-start.toml",
+    synchronised_soft_transfer: "soft-transfer.toml",
+    peak_lopping: "peak-lopping.toml",
+    dkg705_mains_failure: "dkg705-mains-failure.toml",
+    dkg705_short_dip: "dkg705-short-dip.toml",
+    dkg705_soft_transfer: "dkg705-soft-transfer.toml",
+    compressor_day: "compressor-day.toml",
+    compressor_hot_discharge: "compressor-hot-discharge.toml",
+    compressor_locked: "compressor-locked.toml",
+}
+
+#[test]
+fn every_file_is_played() {
+    let files = fs::read_dir(folder()).unwrap();
+    let names: BTreeSet<_> = files.map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
+    assert_eq!(names, PLAYED.iter().map(|name| (*name).to_owned()).collect());
+}
+
+#[test]
+fn the_example_of_the_documentation_holds() {
+    let page = fs::read_to_string(root().join("docs/scenarios.md")).unwrap();
+    let (_, rest) = page.split_once("```toml\n").unwrap();
+    let (text, _) = rest.split_once("```").unwrap();
+    assert_held(&play("docs/scenarios.md", text));
+}
+
+fn holds(file: &str) {
+    let text = fs::read_to_string(folder().join(file)).unwrap();
+    assert_held(&play(file, &text));
+}
+
+fn play(file: &str, text: &str) -> Report {
+    Scenario::parse(file, text).unwrap_or_else(|findings| panic!("{findings}")).play().unwrap()
+}
+
+#[track_caller]
+fn assert_held(report: &Report) {
+    let failures: Vec<_> = report.failures().map(|check| report.sentence(check)).collect();
+    let told: Vec<_> =
+        report.events.iter().map(|event| format!("{:>8} s  {}", event.seconds(), event.text)).collect();
+    assert!(failures.is_empty(), "{}\n\n{}", failures.join("\n"), told.join("\n"));
+    assert_eq!((report.held, report.taken), (Some(true), report.steps));
+    assert!(report.checks.len() > 2, "a scenario that expects next to nothing is no test");
+}
+
+fn folder() -> PathBuf {
+    root().join("examples/scenarios")
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}

@@ -1,0 +1,215 @@
+// The page of the imitation in a real browser, on the real program: what is done there happens on the site, and the
+// operator's page shows what the site makes of it.
+import { mkdir } from 'node:fs/promises'
+import { fileURLToPath } from 'node:url'
+import { chromium, type Browser, type Page } from 'playwright-core'
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest'
+import { Controller, Demo } from './busbar'
+
+const SHOTS = fileURLToPath(new URL('shots/', import.meta.url))
+const DOCS = fileURLToPath(new URL('../../docs/', import.meta.url))
+
+const DESK = { width: 1280, height: 900 }
+const PHONE = { width: 360, height: 740 }
+/** Three units share a line at 9600 baud, and a genset takes its time to start. */
+const REACTS_MS = 60_000
+
+let browser: Browser
+let demo: Demo
+let complaints: string[] = []
+
+beforeAll(async () => {
+  await mkdir(SHOTS, { recursive: true })
+  browser = await chromium.launch({
+    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+    // Root has no sandbox; nothing but the page under test is opened.
+    args: ['--no-sandbox'],
+  })
+  demo = await Demo.start()
+})
+
+afterAll(async () => {
+  await browser?.close()
+  await demo?.stop()
+})
+
+afterEach(() => {
+  complaints = []
+})
+
+/** Opens a page of the program; whatever the browser complains about from here on is kept. */
+async function open(
+  address: string,
+  viewport = DESK,
+  colorScheme: 'light' | 'dark' = 'light',
+): Promise<Page> {
+  const page = await browser.newPage({ viewport, colorScheme })
+  page.on('console', (message) => {
+    if (message.type() === 'error' || message.type() === 'warning')
+      complaints.push(`console: ${message.text()}`)
+  })
+  page.on('pageerror', (error) => complaints.push(`error: ${error.message}`))
+  page.on('request', (request) => {
+    if (!request.url().startsWith(new URL('/', address).href))
+      complaints.push(`a request to somebody else: ${request.url()}`)
+  })
+  await page.goto(address)
+  return page
+}
+
+const imitation = (id: string) => `${demo.address}imitation/#${id}`
+const overflow = (page: Page) =>
+  page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth)
+const words = (text: string | null) => text?.replace(/\s+/g, ' ').trim() ?? ''
+const press = (page: Page, name: string) => page.getByRole('button', { name, exact: true }).click()
+
+/** What must stand in the drawing of each controller of the site. */
+const SITE = [
+  {
+    id: 'genset-1',
+    name: 'Genset 1',
+    drawn: /Mains, .*Mains breaker, (open|closed).*Tank.*Radiator.*Battery/,
+  },
+  {
+    id: 'genset-2',
+    name: 'Genset 2',
+    drawn: /Mains, .*Mains breaker, (open|closed).*Tank.*Radiator.*Battery/,
+  },
+  { id: 'switch-1', name: 'Transfer switch', drawn: /Source 1.*QS1, (open|closed).*Source 2.*QTIE/ },
+  { id: 'compressor-1', name: 'Compressor', drawn: /Engine.*Load valve, (un)?loaded.*Receiver.*kPa.*Tank/ },
+] as const
+
+describe.each([
+  ['desk', DESK, 'light'],
+  ['phone', PHONE, 'dark'],
+] as const)('on a %s', (look, viewport, scheme) => {
+  test.each(SITE)(`in ${scheme} colours the plant of $name is drawn, live`, async ({ id, name, drawn }) => {
+    const page = await open(imitation(id), viewport, scheme)
+    await page.getByRole('heading', { level: 2, name, exact: true }).waitFor()
+    expect(await page.getByRole('img').getAttribute('aria-label')).toMatch(drawn)
+    const time = page.locator('#time')
+    const before = await time.textContent()
+    await expect.poll(() => time.textContent()).not.toBe(before)
+    // No word of the drawing stands beyond its edge.
+    const outside = await page.locator('#drawing svg').evaluate((svg) => {
+      const { left, right } = svg.getBoundingClientRect()
+      return [...svg.querySelectorAll('text')]
+        .filter((text) => {
+          const box = text.getBoundingClientRect()
+          return box.left < left - 1 || box.right > right + 1
+        })
+        .map((text) => text.textContent)
+    })
+    expect(outside).toEqual([])
+    expect(await overflow(page)).toBe(0)
+    await page.screenshot({ path: `${SHOTS}imitation-${id}-${look}-${scheme}.png`, fullPage: true })
+    expect(complaints).toEqual([])
+    await page.close()
+  })
+})
+
+test('at a choice the mains of a genset fail, and the site saves itself', async () => {
+  const operator = await open(demo.address)
+  const card = operator.locator('[data-device="genset-2"]')
+  const says = (expected: RegExp) =>
+    expect.poll(async () => words(await card.innerText()), { timeout: REACTS_MS }).toMatch(expected)
+  await says(/Mains breaker closed .*Genset breaker open/)
+
+  // The way of a person: from the operator's page to the imitation, and there to the genset.
+  await operator.getByRole('link', { name: 'Imitation' }).click()
+  await operator.getByRole('link', { name: 'Genset 2' }).click()
+  await operator.getByRole('heading', { level: 2, name: 'Genset 2' }).waitFor()
+  await press(operator, 'Fail the mains')
+  await operator.getByText('Pulled: Mains: failed').waitFor()
+  await operator.screenshot({ path: `${SHOTS}imitation-failed.png`, fullPage: true })
+  await operator.getByRole('link', { name: 'Operator’s page' }).click()
+
+  await says(/State Load on genset/)
+  await says(/Mains voltage 0 V .*Mains breaker open .*Genset breaker closed Genset power [1-9]/)
+  await operator.screenshot({ path: `${SHOTS}imitation-saved.png`, fullPage: true })
+
+  // Minutes pass until the mains are believed again; nobody waits for them here.
+  const page = await open(imitation('genset-2'))
+  await page.getByText('State: load on genset').waitFor()
+  await press(page, 'Give the mains back')
+  await page.getByText('Nothing is pulled.').waitFor()
+  await press(page, '+ 10 min')
+  await says(/Mains breaker closed .*Genset breaker open/)
+  expect(complaints).toEqual([])
+  await page.close()
+  await operator.close()
+})
+
+test('by keyboard alone the clock is stopped, stepped, and goes on', async () => {
+  const page = await open(imitation('switch-1'))
+  const time = page.locator('#time')
+  const key = async (name: string, then: string) => {
+    await page.getByRole('button', { name, exact: true }).focus()
+    await page.keyboard.press('Enter')
+    await page.getByRole('status').getByText(then).waitFor()
+  }
+  await key('Pause', 'Paused')
+  const before = (await time.textContent()) ?? ''
+  await key('+ 1 min', 'Stepped 1 min')
+  const seconds = (text: string) => text.split(':').reduce((sum, part) => 60 * sum + Number(part), 0)
+  expect(seconds((await time.textContent()) ?? '') - seconds(before)).toBe(60)
+  await key('Go on', 'Goes on')
+  await page.getByLabel('Speed').selectOption('60 ×')
+  await page.getByRole('status').getByText('Speed 60').waitFor()
+  await page.getByLabel('Speed').selectOption('1 ×')
+  await page.getByRole('status').getByText('Speed 1').waitFor()
+  expect(complaints).toEqual([])
+  await page.close()
+})
+
+test('a point is pinned and let go, and what cannot be is told in a sentence', async () => {
+  const page = await open(imitation('genset-1'))
+  await page.getByText('Pinned points').click()
+  const pin = async (point: string, value: string) => {
+    await page.getByLabel('Point', { exact: true }).fill(point)
+    await page.getByLabel('Value', { exact: true }).fill(value)
+    await press(page, 'Pin')
+  }
+  await pin('battery_voltage', '21.5')
+  await page.getByText('battery_voltage = 21.5').waitFor()
+  expect(await page.getByRole('img').getAttribute('aria-label')).toContain('Battery, 21.5 V')
+  expect(complaints).toEqual([])
+  await pin('battery_voltage', 'flat')
+  await page.getByRole('alert').getByText('cannot set battery_voltage to `flat`').waitFor()
+  await page.getByLabel('Alarm', { exact: true }).fill('no_such_alarm')
+  await press(page, 'Inject')
+  await page.getByRole('alert').getByText('the controller has no alarm `no_such_alarm`').waitFor()
+  await press(page, 'Let battery_voltage go')
+  await expect.poll(() => page.getByRole('list', { name: 'Pinned points' }).innerText()).toBe('')
+  expect(await page.getByRole('alert').isVisible()).toBe(false)
+  await page.close()
+})
+
+test('an imitation with a token asks for it', async () => {
+  const one = await Controller.start('datakom-d', 'tcp://127.0.0.1:0', '--control', '127.0.0.1:0')
+  const page = await browser.newPage({ viewport: PHONE })
+  await page.goto(one.control)
+  await page.getByRole('alert').getByText('a token is needed').waitFor()
+  expect(await page.getByRole('img').count()).toBe(0)
+  await page.getByLabel('Token').fill('this is another one')
+  await press(page, 'Show it')
+  await page.getByRole('alert').getByText('the token is another one').waitFor()
+  await page.getByLabel('Token').fill(Controller.TOKEN)
+  await press(page, 'Show it')
+  await page.getByRole('heading', { level: 2, name: 'Datakom D-500' }).waitFor()
+  expect(await page.getByRole('alert').isVisible()).toBe(false)
+
+  await one.stop()
+  await page.getByRole('alert').getByText('No connection to the imitation.').waitFor()
+  await page.screenshot({ path: `${SHOTS}imitation-lost.png` })
+  await page.close()
+})
+
+// Only when asked for, so that a test run leaves the tree as it was.
+test.runIf(process.env.BUSBAR_SCREENSHOT === '1')('the picture of the documentation', async () => {
+  const page = await open(imitation('genset-2'), { width: 1100, height: 700 })
+  await press(page, 'Fail the mains')
+  await page.getByText('State: load on genset').waitFor({ timeout: REACTS_MS })
+  await page.screenshot({ path: `${DOCS}imitation.png` })
+  await page.close()
+})
