@@ -120,7 +120,7 @@ test('at a choice the mains of a genset fail, and the site saves itself', async 
   await operator.getByRole('link', { name: 'Genset 2' }).click()
   await operator.getByRole('heading', { level: 2, name: 'Genset 2' }).waitFor()
   await press(operator, 'Fail the mains')
-  await operator.getByText('Pulled: Mains: failed').waitFor()
+  await operator.getByText('Pulled: Mains (failed)').waitFor()
   await operator.screenshot({ path: `${SHOTS}imitation-failed.png`, fullPage: true })
   await operator.getByRole('link', { name: 'Operator’s page' }).click()
 

@@ -67,6 +67,9 @@ function failed(error) {
     $('token').hidden = false
     $('site').hidden = true
   }
+  if (!isRefused || error.status === 404) controllers = []
+  // What was not heard lately looks it.
+  $('site').classList.toggle('lost', !isRefused)
   tell(isRefused ? error.message : 'No connection to the imitation. What is shown is as it was last heard.')
 }
 
@@ -86,7 +89,9 @@ async function act(said, path, method, body) {
 const pull = (lever, position) =>
   act(`${lever.name}: ${worded(lever, position)}`, `/levers/${lever.id}`, 'PUT', { position })
 const worded = (lever, position) =>
-  typeof position === 'number' ? `${round(position)} ${lever.numbers?.unit ?? ''}`.trim() : spaced(position)
+  typeof position === 'number' ? `${round(position)} ${unitOf(lever.numbers)}`.trim() : spaced(position)
+/** A unit as people write it. */
+const unitOf = (numbers) => ({ degC: '°C', deg: '°' })[numbers?.unit] ?? numbers?.unit ?? ''
 const spaced = (word) => word.replaceAll('_', ' ')
 const round = (number) => Math.round(number * 100) / 100
 const isHealthy = (lever) => lever.words.length === 0 || lever.position === lever.words[0].id
@@ -117,7 +122,7 @@ function showPlant(values) {
   $('state').textContent = `State: ${spaced(state ?? 'not known')} · Mode: ${spaced(mode ?? 'not known')}`
   $('drawing').replaceChildren(draw(shown, values))
   const pulled = shown.levers.filter((lever) => !isHealthy(lever) && typeof lever.position === 'string')
-  const list = pulled.map((lever) => `${lever.name}: ${spaced(lever.position)}`)
+  const list = pulled.map((lever) => `${lever.name} (${spaced(lever.position)})`)
   $('pulled').textContent = list.length > 0 ? `Pulled: ${list.join(' · ')}` : 'Nothing is pulled.'
 }
 
@@ -193,7 +198,7 @@ function leverForm(lever) {
         button.dataset.word = id
         return button
       }),
-      ...(numbers ? [numberForm(numbers, `${lever.name}, ${numbers.unit}`, (to) => pull(lever, to))] : []),
+      ...(numbers ? [numberForm(numbers, lever.name, (to) => pull(lever, to))] : []),
     ),
     h('p'),
   )
@@ -201,14 +206,20 @@ function leverForm(lever) {
   return form
 }
 
-function numberForm({ min, max, unit }, name, set) {
+function numberForm(numbers, name, set) {
+  const { min, max } = numbers
   const input = h('input', { type: 'number', min, max, step: 'any', required: true, aria: { label: name } })
   input.placeholder = `${min} to ${max}`
   const onsubmit = (event) => {
     event.preventDefault()
     void set(Number(input.value))
   }
-  return h('form', { className: 'row', onsubmit }, h('label', {}, input, unit ?? ''), h('button', {}, 'Set'))
+  return h(
+    'form',
+    { className: 'row', onsubmit },
+    h('label', {}, input, unitOf(numbers)),
+    h('button', {}, 'Set'),
+  )
 }
 
 function showAlarms() {
@@ -273,7 +284,7 @@ async function showSettings(id) {
       h(
         'fieldset',
         {},
-        h('legend', {}, `${setting.name} `, h('small', {}, `${round(setting.value)} ${setting.unit ?? ''}`)),
+        h('legend', {}, `${setting.name} `, h('small', {}, `${round(setting.value)} ${unitOf(setting)}`)),
         numberForm(setting, setting.name, set(setting)),
       ),
     ),
@@ -288,13 +299,15 @@ async function refresh() {
 }
 
 async function show() {
-  controllers = await ask('')
-  const wanted = decodeURIComponent(location.hash.slice(1))
-  const next = controllers.find(({ id }) => id === wanted) ?? controllers[0]
-  if (!next) return
-  if (next.id !== shown?.id) await begin(next.id)
-  const state = statePoint ? ask(`/${next.id}/values?name=${statePoint}`) : []
-  const [signals, more, pins] = await Promise.all([ask(`/${next.id}/values`), state, ask(`/${next.id}/pins`)])
+  // Which there are does not change while the imitation runs; another one may have taken its place.
+  if (controllers.length === 0) controllers = await ask('')
+  const chosen = controllers.find(({ id }) => location.hash === `#${id}`) ?? controllers[0]
+  if (!chosen) return
+  const { id } = chosen
+  if (id !== shown?.id) await begin(id)
+  const state = statePoint ? ask(`/${id}/values?name=${statePoint}`) : []
+  const asked = [ask(`/${id}`), ask(`/${id}/values`), state, ask(`/${id}/pins`)]
+  const [next, signals, more, pins] = await Promise.all(asked)
   shown = next
   document.title = `${shown.name} · Imitation`
   showControllers()
@@ -313,7 +326,7 @@ async function live() {
     if (!document.hidden) {
       try {
         await refresh()
-        if ($('problem').textContent.startsWith('No connection')) tell('')
+        if ($('site').classList.replace('lost', 'heard')) tell('')
       } catch (error) {
         failed(error)
       }

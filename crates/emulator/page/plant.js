@@ -141,8 +141,7 @@ function genset(look) {
     ...source(look, 'genset', 'Genset', 230, 'G'),
     ...breaker(look, 'mains', 'Mains breaker', 50, 86, live.mains, 'breaker.mains'),
     ...breaker(look, 'genset', 'Genset breaker', 230, 86, live.genset, 'breaker.genset'),
-    line('M50 110V140', fed && look.isClosed('mains')),
-    line('M230 110V140', fed && look.isClosed('genset')),
+    line('M50 110V140M230 110V140', fed),
     path('M20 140H340', fed ? 'live bus' : 'dead'),
     ...load(140, 140, 'Load', fed, fed ? `${power.toFixed(0)} kW` : 'without supply'),
     ...supplies(look, 190),
@@ -157,7 +156,7 @@ function transferSwitch(look) {
   const side = (number, x) => [
     ...source(look, `src${number}`, `Source ${number}`, x),
     ...breaker(look, `src${number}`, `QS${number}`, x, 86, live[`src${number}`], `switch.qs${number}`),
-    line(`M${x} 110V150`, fed[number] && look.isClosed(`src${number}`)),
+    line(`M${x} 110V150`, fed[number]),
     path(`M${x - 35} 150H${x + 65}`, fed[number] ? 'live bus' : 'dead'),
     ...load(x, 150, `Load ${number}`, fed[number], fed[number] ? 'fed' : 'without supply'),
     text(x - 35, 214, 'dim', look.word(`state.src${number}`)),

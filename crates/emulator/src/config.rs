@@ -32,8 +32,8 @@ pub struct Config {
     pub story: bool,
     /// What happens to it, and what is expected of it.
     pub scenario: Option<Scenario>,
-    /// What the calendar of a controller that has one says at power-on. Nothing else depends on it: the weather, the
-    /// story and every other register follow the seed and the time that has passed.
+    /// What the calendar of a controller that has one says at power-on. Nothing depends on it but what that controller
+    /// does by its calendar: the weather, the story and the rest follow the seed and the time that has passed.
     pub epoch: DateTime,
     /// Connections served at the same time; further ones are closed at once.
     pub connections: usize,

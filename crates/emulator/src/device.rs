@@ -279,6 +279,8 @@ impl Device {
     pub fn set(&mut self, id: &str, text: &str) -> Result<(), SettingError> {
         self.settings.set(id, text)?;
         self.panel.configure(&self.settings);
+        // Some are shown in registers.
+        self.panel.render(&mut self.bank);
         Ok(())
     }
 
@@ -327,7 +329,8 @@ fn panel(profile: &'static Profile, config: &Config) -> Result<(Box<dyn Panel>, 
         "datakom-dkg705" => {
             // There is one.
             let model = chosen(&profile.models, config, "DKG-705")?;
-            Ok((Box::new(DatakomDkg705::new(config.seed, config.story).starting(config.epoch)), model))
+            let unit = DatakomDkg705::new(config.seed, config.story, &Settings::of(profile));
+            Ok((Box::new(unit.starting(config.epoch)), model))
         }
         "smartgen-acc1700" => {
             let model = chosen(&profile.models, config, "ACC1700CAN")?;

@@ -181,7 +181,7 @@ pub(crate) struct EmulatorFile {
 #[derive(Debug, serde::Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SettingFile {
-    /// Its id, unique among the settings and the points.
+    /// Its id, unique among the settings; that of a point where a register shows what it is set to.
     pub(crate) id: At<String>,
     /// What it is called.
     pub(crate) name: String,

@@ -282,7 +282,7 @@ pub struct Coil {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Setting {
-    /// Its id, unique among the settings and the points of the profile.
+    /// Its id, unique among the settings of the profile; that of a point where a register shows what it is set to.
     pub id: String,
     /// What it is called.
     pub name: String,

@@ -110,7 +110,13 @@ fn settings_of_the_imitation() {
         report(&[
             ("id = \"crank_time\"", "id = \"Crank time\""),
             ("id = \"crank_time\"", "id = \"start_attempts\""),
-            ("id = \"crank_time\"", "id = \"delay\""),
+            // A setting that a register shows.
+            ("id = \"crank_time\"", "id = \"status\""),
+            ("id = \"crank_time\"", "id = \"voltage\""),
+            (
+                "id = \"crank_time\", name = \"Crank timer\", value = 6,",
+                "id = \"delay\", name = \"Delay\", value = 6.5,",
+            ),
             ("name = \"Crank timer\"", "name = \" \""),
             ("value = 6, min", "value = 0, min"),
             ("max = 99, unit", "max = 5, unit"),

@@ -1,7 +1,7 @@
 //! The shapes of the API: what every answer and every body holds, with its schema.
 
 use busbar_profile as profile;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::openapi::{RefOr, schema};
 use utoipa::{PartialSchema, ToSchema};
@@ -82,9 +82,11 @@ pub(super) struct ClockView {
 #[serde(deny_unknown_fields)]
 pub(super) struct ClockChange {
     /// Simulated seconds a second: above 0 and up to 3600.
+    #[serde(default, deserialize_with = "given")]
     #[schema(nullable = false, exclusive_minimum = 0, maximum = 3600, examples(60))]
     pub(super) speed: Option<f64>,
     /// Whether it is to stand still.
+    #[serde(default, deserialize_with = "given")]
     #[schema(nullable = false)]
     pub(super) paused: Option<bool>,
 }
@@ -239,6 +241,11 @@ pub(super) enum Given {
     Text(String),
     /// A number.
     Number(f64),
+}
+
+/// What may be left out, and is no null where it is given.
+fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(deserializer).map(Some)
 }
 
 impl Given {

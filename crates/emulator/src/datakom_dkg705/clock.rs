@@ -36,6 +36,24 @@ impl Clock {
         self.parts
     }
 
+    pub(super) fn day(&self) -> u8 {
+        self.parts[DAY]
+    }
+
+    pub(super) fn minute(&self) -> u8 {
+        self.parts[MINUTE]
+    }
+
+    /// Since Monday 00:00.
+    pub(super) fn hour_of_the_week(&self) -> u16 {
+        let [year, month, day, hour, ..] = self.parts;
+        let leap_days = u16::from(year).div_ceil(4);
+        let months: u16 = (1..month).map(|month| u16::from(days_of(year, month))).sum();
+        let days = 365 * u16::from(year) + leap_days + months + u16::from(day) - 1;
+        // The first of January 2000 was a Saturday.
+        (days + 5) % 7 * 24 + u16::from(hour)
+    }
+
     pub(super) fn step(&mut self, dt: Duration) {
         self.passed += dt;
         while let Some(rest) = self.passed.checked_sub(Duration::from_secs(1)) {
@@ -106,6 +124,20 @@ mod tests {
         assert_eq!(after([28, 2, 28, 23, 59, 59], 1), [28, 2, 29, 0, 0, 0]);
         assert_eq!(after([26, 2, 28, 23, 59, 59], 1), [26, 3, 1, 0, 0, 0]);
         assert_eq!(after([26, 4, 30, 23, 59, 59], 1), [26, 5, 1, 0, 0, 0]);
+    }
+
+    #[test]
+    fn the_week_begins_on_monday() {
+        for (time, hour) in [
+            ("2000-01-01T00:00:00", 5 * 24),
+            ("2026-01-05T10:59:59", 10),
+            ("2026-01-11T23:00:00", 167),
+            ("2028-02-29T07:00:00", 24 + 7),
+            ("2028-03-01T00:00:00", 2 * 24),
+            ("2099-12-31T01:00:00", 3 * 24 + 1),
+        ] {
+            assert_eq!(Clock::at(time.parse().unwrap()).hour_of_the_week(), hour, "{time}");
+        }
     }
 
     #[test]

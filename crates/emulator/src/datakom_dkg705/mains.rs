@@ -4,13 +4,10 @@ use std::time::Duration;
 
 use crate::plant::Feed;
 
-use super::settings::SITE;
+use super::parameters::MainsLimits;
 
-/// How long a fault must last to be one, and a return.
-const FAILED_AFTER: Duration = Duration::from_millis(300);
-const BACK_AFTER: Duration = Duration::from_secs(1);
-/// The table has no limits for the mains frequency: these are wide.
-const HERTZ: std::ops::RangeInclusive<f64> = 47.0..=53.0;
+/// V below which a phase has none.
+const DEAD: f64 = 50.0;
 
 /// The mains as the unit judges them.
 #[derive(Clone, Debug)]
@@ -26,20 +23,26 @@ impl Mains {
     /// Good since long ago.
     pub(super) const GOOD: Self = Self { healthy: true, doubted: Duration::ZERO, waiting: Duration::ZERO };
 
-    pub(super) fn step(&mut self, dt: Duration, feed: &Feed) {
+    pub(super) fn step(&mut self, dt: Duration, feed: &Feed, limits: &MainsLimits) {
         if self.healthy {
             self.waiting = self.waiting.saturating_sub(dt);
         }
-        if within_limits(feed, self.healthy) == self.healthy {
+        if within_limits(feed, self.healthy, limits) == self.healthy {
             self.doubted = Duration::ZERO;
             return;
         }
         self.doubted += dt;
-        if self.doubted >= if self.healthy { FAILED_AFTER } else { BACK_AFTER } {
+        if self.doubted >= if self.healthy { limits.fail } else { limits.back } {
             self.healthy = !self.healthy;
             self.doubted = Duration::ZERO;
-            self.waiting = Duration::from_secs(SITE.mains_waiting);
+            self.waiting = limits.waiting;
         }
+    }
+
+    /// Takes them for failed, whatever their voltage: they must prove themselves anew.
+    pub(super) fn condemn(&mut self) {
+        self.healthy = false;
+        self.doubted = Duration::ZERO;
     }
 
     /// Inside their limits at this moment.
@@ -58,23 +61,36 @@ impl Mains {
     }
 }
 
-/// Mains that have failed must come back inside their limits by the hysteresis.
-fn within_limits(feed: &Feed, were_healthy: bool) -> bool {
-    let margin = if were_healthy { 0.0 } else { SITE.hysteresis_voltage };
-    let volts = SITE.mains_voltage_low + margin..=SITE.mains_voltage_high - margin;
-    feed.voltage.iter().all(|phase| volts.contains(phase)) && HERTZ.contains(&feed.frequency)
+/// Whether all phases are there and follow each other the wrong way round.
+pub(super) fn is_order_wrong(feed: &Feed) -> bool {
+    feed.phase_order_wrong && feed.voltage.iter().all(|phase| *phase > DEAD)
+}
+
+/// Mains that have failed must come back inside their limits by the hysteresis. A limit of 0 is not watched.
+fn within_limits(feed: &Feed, were_healthy: bool, limits: &MainsLimits) -> bool {
+    let margin = if were_healthy { 0.0 } else { limits.hysteresis };
+    let between = |value: f64, low: f64, high: f64, margin: f64| {
+        (low == 0.0 || value >= low + margin) && (high == 0.0 || value <= high - margin)
+    };
+    feed.voltage.iter().all(|phase| *phase > DEAD && between(*phase, limits.low, limits.high, margin))
+        && between(feed.frequency, limits.low_frequency, limits.high_frequency, 0.0)
+        && (limits.any_order || !is_order_wrong(feed))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::parameters::{site, site_with};
     use super::*;
 
     const TENTH: Duration = Duration::from_millis(100);
 
+    fn feed(volts: f64) -> Feed {
+        Feed { voltage: [231.0, 231.0, volts], frequency: 50.0, ..Feed::default() }
+    }
+
     fn pass(mains: &mut Mains, volts: f64, tenths: u32) {
-        let feed = Feed { voltage: [231.0, 231.0, volts], frequency: 50.0, ..Feed::default() };
         for _ in 0..tenths {
-            mains.step(TENTH, &feed);
+            mains.step(TENTH, &feed(volts), &site().mains);
         }
     }
 
@@ -95,5 +111,32 @@ mod tests {
         assert!(!mains.is_trusted());
         pass(&mut mains, 231.0, 1);
         assert!(mains.is_trusted());
+    }
+
+    #[test]
+    fn every_limit_counts_where_it_is_watched() {
+        let reversed = Feed { phase_order_wrong: true, ..feed(231.0) };
+        for (feed, parameter) in [
+            (feed(180.0), ("mains_voltage_low_limit", "0")),
+            (feed(270.0), ("mains_voltage_high_limit", "0")),
+            (Feed { frequency: 46.0, ..feed(231.0) }, ("mains_frequency_low", "0")),
+            (Feed { frequency: 54.0, ..feed(231.0) }, ("mains_frequency_high", "0")),
+            (reversed, ("ignore_phase_order", "1")),
+        ] {
+            assert!(!within_limits(&feed, true, &site().mains), "{parameter:?}");
+            assert!(within_limits(&feed, true, &site_with(&[parameter]).mains), "{parameter:?}");
+        }
+        let unwatched = site_with(&[("mains_voltage_low_limit", "0"), ("mains_frequency_low", "0")]);
+        assert!(!within_limits(&feed(0.0), true, &unwatched.mains), "a dead phase is never good");
+    }
+
+    #[test]
+    fn condemned_mains_must_prove_themselves() {
+        let mut mains = Mains::GOOD;
+        mains.condemn();
+        pass(&mut mains, 231.0, 9);
+        assert!(!mains.is_healthy());
+        pass(&mut mains, 231.0, 1);
+        assert!(mains.is_healthy() && !mains.is_trusted());
     }
 }

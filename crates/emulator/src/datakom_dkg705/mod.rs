@@ -1,35 +1,25 @@
 //! Datakom DKG-705: modes, clock and the situation the unit is in.
 //!
-//! Power-on finds the unit in AUTO with healthy mains that carry the load.
-//! Where the manual is silent this is what the imitation does:
-//! - 8-bit registers take the low byte of a word; a mode is chosen by exactly one key, other words have no effect;
-//! - each number of the clock counts at once if it is in its own range; a date that does not exist lasts till midnight;
-//! - TEST runs the genset beside the load, and on load if the mains fail; LOAD TEST runs it on load;
-//! - while the engine runs without load the status is 0, as the mains carry the load;
-//! - OFF cools a running engine down first; OFF again stops it at once. OFF lets go of shutdowns and load dumps, which
-//!   keep the genset from starting until then;
-//! - a start that has opened the fuel is finished, even when the mains come back;
-//! - the load moves between two live sources without a break and slowly, after synchronizing for as long as it takes,
-//!   with a warning after a minute. With the mains dead it moves with a break;
-//! - the warnings "genset on load" and "mains on load" are options of a site, and not used at this one;
-//! - fuel level, oil temperature, charge input and reverse power have no limits in the table: those of a usual site;
-//! - low and high rpm warn where low and high frequency do; the rpm shutdowns are not used;
-//! - relays 1, 3 and 7 are the timed alarm, idle speed and stop; module 1 repeats functions, module 2 is not fitted;
-//! - "auto ready" is AUTO without a shutdown or load dump, "load contactor" is either contactor;
-//! - the synchroscope shows 0 while either source is dead, GOV and AVR stand at 50 % while they do not regulate;
-//! - the transformer ratio is that of the primary, 200 to 5 A; the fuel economy is in kWh a litre;
-//! - the exerciser runs by the demonstration's story alone.
+//! Power-on finds the unit in AUTO with healthy mains that carry the load. `docs/imitation/datakom-dkg705.md` has its
+//! states and what it does where the manual is silent.
 
 mod alarms;
 mod clock;
 mod ecu;
+mod exerciser;
+mod levers;
 mod mains;
+mod measures;
 mod operation;
+mod parameters;
+mod protections;
 mod regulation;
 mod render;
 mod sequence;
-mod settings;
 mod story;
+#[cfg(test)]
+mod transitions;
+mod watches;
 
 use std::time::Duration;
 
@@ -39,18 +29,22 @@ use busbar_profile::DateTime;
 use crate::bank::Bank;
 use crate::levers::{Lever, Position};
 use crate::panel::Panel;
-use crate::plant::{self, Controls, Plant, Tank};
+use crate::plant::{Controls, Plant, Tank};
 use crate::random::Random;
 use crate::rules::Refusals;
+use crate::settings::Settings;
 
-use alarms::{Alarms, View};
+use alarms::{Alarms, Contacts, View};
 use clock::Clock;
 use ecu::Ecu;
+use exerciser::Exerciser;
 use mains::Mains;
+use measures::Measures;
 use operation::Operation;
-use regulation::Regulation;
+use parameters::Parameters;
+use protections::Protections;
+use regulation::{Regulation, Task};
 use sequence::{Demand, Sensed, Sequence};
-use settings::SITE;
 use story::Scene;
 
 const CLOCK: u16 = 0x0024;
@@ -59,29 +53,37 @@ const MODE_KEYS: u16 = 0x0040;
 
 /// kW below which a contactor may open after a soft transfer.
 const NEXT_TO_NOTHING: f64 = 2.5;
+/// How long the other genset of the busbar may be silent.
+const PARTNER_SILENCE: Duration = Duration::from_secs(5);
 
 /// The unit and its plant.
 #[derive(Clone, Debug)]
 pub(crate) struct DatakomDkg705 {
     plant: Plant,
+    set: Parameters,
+    measures: Measures,
     mains: Mains,
     sequence: Sequence,
     regulation: Regulation,
+    protections: Protections,
     alarms: Alarms,
     ecu: Ecu,
     clock: Clock,
+    exerciser: Exerciser,
     mode: Mode,
+    last_key: Mode,
+    peak: Peak,
     controls: Controls,
     block_heater: bool,
     fuel_pump: bool,
+    sheds_load: bool,
+    partner_silent: Duration,
+    service: Service,
     story: bool,
     scene: Scene,
-    hours_at_service: f64,
-    /// Days between the last service and power-on.
-    days_before: f64,
 }
 
-/// Bits of registers 003Dh and 0040h; the last key is always that of the mode.
+/// Bits of registers 003Dh and 0040h.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     Auto,
@@ -111,49 +113,80 @@ impl Mode {
     }
 }
 
+/// Whether the mains need help, and for how long they have needed the contrary.
+#[derive(Clone, Copy, Debug, Default)]
+struct Peak {
+    lopping: bool,
+    doubted: Duration,
+}
+
+/// What stood on the counters when the genset was last serviced.
+#[derive(Clone, Copy, Debug)]
+struct Service {
+    /// Engine hours.
+    hours: f64,
+    /// Days of the plant's time; negative where it was before power-on.
+    days: f64,
+}
+
 impl DatakomDkg705 {
     /// A unit at power-on.
-    pub(crate) fn new(seed: u64, story: bool) -> Self {
+    pub(crate) fn new(seed: u64, story: bool, settings: &Settings) -> Self {
         let mut random = Random::new(seed ^ 0xD705);
         let mut plant = Plant::new(seed);
         if story {
             // Low enough that the story reaches the warning.
             plant.tank = Tank::new(24.9);
         }
+        let (set, clock) = (Parameters::of(settings), Clock::at(DateTime::FIRST));
         Self {
+            measures: Measures::of(&plant, &set.options),
+            set,
             mains: Mains::GOOD,
-            sequence: Sequence::new(SITE),
+            sequence: Sequence::new(),
             regulation: Regulation::new(&mut plant),
+            protections: Protections::default(),
             alarms: Alarms::default(),
             ecu: Ecu::new(&plant),
-            clock: Clock::at(DateTime::FIRST),
+            exerciser: Exerciser::at(&clock),
+            clock,
             mode: Mode::Auto,
+            last_key: Mode::Auto,
+            peak: Peak::default(),
             controls: Controls { mains_breaker: true, ..Controls::default() },
             block_heater: false,
             fuel_pump: false,
+            sheds_load: false,
+            partner_silent: Duration::ZERO,
+            service: Service {
+                hours: plant.engine.hours - random.between(20.0, 110.0),
+                days: -random.between(20.0, 90.0),
+            },
             story,
             scene: Scene::NOTHING,
-            hours_at_service: plant.engine.hours - random.between(20.0, 110.0),
-            days_before: random.between(20.0, 90.0),
             plant,
         }
     }
 
     /// The same unit with its clock set.
     pub(crate) fn starting(self, epoch: DateTime) -> Self {
-        Self { clock: Clock::at(epoch), ..self }
+        let clock = Clock::at(epoch);
+        Self { exerciser: Exerciser::at(&clock), clock, ..self }
     }
 
     fn press(&mut self, keys: u8) {
         let Some(mode) = Mode::of(keys) else { return };
-        if mode == Mode::Off {
-            if self.mode == Mode::Off {
-                self.sequence.stop_now();
-            }
-            self.sequence.acknowledge();
-            self.alarms.acknowledge();
+        if mode == Mode::Off && self.last_key == Mode::Off {
+            self.sequence.stop_now(&self.set);
         }
-        self.mode = mode;
+        self.sequence.acknowledge();
+        self.alarms.acknowledge();
+        self.exerciser.cancel();
+        let tests = matches!(mode, Mode::Test | Mode::LoadTest);
+        if tests && self.set.exercise.by_buttons {
+            self.exerciser.begin(self.set.exercise.duration, Mode::Auto);
+        }
+        (self.mode, self.last_key) = (mode, mode);
     }
 
     fn demand(&self) -> Demand {
@@ -168,9 +201,10 @@ impl DatakomDkg705 {
         match self.mode {
             Mode::Off => Demand::REST,
             Mode::LoadTest => Demand::ON_LOAD,
-            Mode::Auto if mains_missing || self.scene.exerciser => Demand::ON_LOAD,
+            Mode::Auto if mains_missing || self.plant.remote_start => Demand::ON_LOAD,
+            Mode::Auto if self.peak.lopping => Demand::PARALLEL,
             Mode::Auto => Demand::REST,
-            Mode::Test if mains_missing && SITE.emergency_backup => Demand::ON_LOAD,
+            Mode::Test if mains_missing && self.set.options.emergency_backup => Demand::ON_LOAD,
             Mode::Test => Demand::OFF_LOAD,
         }
     }
@@ -181,26 +215,51 @@ impl DatakomDkg705 {
     }
 
     fn sensed(&self) -> Sensed {
-        let plant = &self.plant;
-        let volts = SITE.low_voltage_shutdown..SITE.high_voltage_shutdown;
-        let hertz = SITE.low_frequency_warning..SITE.high_frequency_warning;
+        let (plant, measures, start) = (&self.plant, &self.measures, &self.set.start);
         Sensed {
             running: plant.engine.is_running(),
             turning: plant.engine.speed > 0.0,
-            genset_healthy: plant.genset.voltage.iter().all(|phase| volts.contains(phase))
-                && hertz.contains(&plant.genset.frequency),
+            warm: (!start.by_coolant || measures.coolant >= start.warm)
+                && (!start.by_oil || measures.oil >= start.warm),
+            genset_healthy: self.is_genset_healthy(),
             mains_healthy: self.mains.is_healthy(),
+            mains_trusted: self.mains.is_trusted(),
             genset_contactor: plant.genset_breaker.closed,
             mains_contactor: plant.mains_breaker.closed,
             in_step: self.regulation.in_step(),
-            genset_unloaded: plant.genset.total_active() < NEXT_TO_NOTHING,
-            mains_unloaded: plant.mains.total_active() < NEXT_TO_NOTHING,
+            genset_unloaded: measures.genset.total_active() < NEXT_TO_NOTHING,
+            // Power that flows back is no sign that the load has moved.
+            mains_unloaded: measures.mains.total_active().abs() < NEXT_TO_NOTHING,
         }
     }
 
-    fn service_due(&self) -> bool {
-        let days = self.days_before + self.plant.time / 86_400.0;
-        self.plant.engine.hours - self.hours_at_service >= SITE.service_hours || days >= SITE.service_days
+    fn is_genset_healthy(&self) -> bool {
+        let (genset, limits) = (&self.measures.genset, &self.set.limits);
+        let between = |value: f64, low: f64, high: f64| value > low && (high == 0.0 || value < high);
+        // An alternator without voltage is never good, whatever is watched.
+        genset.voltage.iter().all(|volts| {
+            *volts > 100.0 && between(*volts, limits.low_voltage_shutdown, limits.high_voltage_shutdown)
+        }) && between(genset.frequency, limits.low_frequency_warning, limits.high_frequency_warning)
+    }
+
+    fn contacts(&self) -> Contacts {
+        let service = &self.set.service;
+        let hours = self.plant.engine.hours - self.service.hours;
+        let days = self.days() - self.service.days;
+        let is_due = |passed: f64, interval: f64| interval > 0.0 && passed >= interval;
+        Contacts {
+            emergency_stop: self.plant.emergency_stop,
+            charger_failed: self.plant.lever("charger") == Some(Position::Word("failed")),
+            mains_order_wrong: mains::is_order_wrong(&self.plant.mains),
+            mains_contactor: self.plant.mains_breaker.closed,
+            service_due: is_due(hours, service.hours) || is_due(days, service.days),
+            partner_missing: self.partner_silent >= PARTNER_SILENCE,
+        }
+    }
+
+    /// Since power-on.
+    fn days(&self) -> f64 {
+        self.plant.time / 86_400.0
     }
 
     /// Left until the situation changes by itself: of the operation, or of the wait for mains that are back.
@@ -211,46 +270,113 @@ impl DatakomDkg705 {
         }
     }
 
+    /// What the demonstration's story does to the plant, and whom it wants exercised.
+    fn tell(&mut self) {
+        if !self.story {
+            return;
+        }
+        let scene = Scene::at(self.plant.time);
+        self.plant.fail_mains(scene.mains_failed);
+        self.plant.tank.other_draw = scene.fuel_draw;
+        if let (None, Some(duration), Mode::Auto) = (self.scene.exercise, scene.exercise, self.mode) {
+            self.exerciser.begin(duration, Mode::Auto);
+            self.mode = Mode::LoadTest;
+        }
+        self.scene = scene;
+    }
+
+    fn exercise(&mut self, dt: Duration) {
+        // The story has exercises of its own.
+        let never = parameters::Exercise { hour: None, ..self.set.exercise.clone() };
+        let set = if self.story { &never } else { &self.set.exercise };
+        if let Some(mode) = self.exerciser.step(dt, &self.clock, set, self.mode) {
+            self.mode = mode;
+        }
+    }
+
+    /// Judges the mains, by their voltage and by what both feeds show while they are joined.
+    fn judge_mains(&mut self, dt: Duration) {
+        self.mains.step(dt, &self.plant.mains, &self.set.mains);
+        let joined = self.plant.mains_breaker.closed && self.plant.genset_breaker.closed;
+        let feeds = (&self.measures.mains, &self.measures.genset);
+        if self.protections.step(dt, joined, feeds, &self.set.parallel, &self.set.mains) {
+            self.mains.condemn();
+        } else if self.mains.is_trusted() && !joined {
+            self.protections.forget();
+        }
+    }
+
+    /// Whether the mains need help: by what they carry before, and by what both carry after the genset has joined.
+    fn judge_load(&mut self, dt: Duration) {
+        let load = self.measures.mains.total_active() + self.measures.genset.total_active();
+        let limits = &self.set.limits;
+        self.sheds_load = match self.measures.genset.total_active() {
+            power if limits.load_shedding_high == 0.0 => power < 0.0 && self.sheds_load,
+            power if power > limits.load_shedding_high => true,
+            power => self.sheds_load && power > limits.load_shedding_low,
+        };
+        let Some(set) = &self.set.peak else {
+            self.peak = Peak::default();
+            return;
+        };
+        let contrary = if self.peak.lopping { load < set.stop } else { load > set.start };
+        self.peak.doubted = if contrary { self.peak.doubted + dt } else { Duration::ZERO };
+        if contrary && self.peak.doubted >= set.delay {
+            self.peak = Peak { lopping: !self.peak.lopping, doubted: Duration::ZERO };
+        }
+    }
+
     /// Switches the heater and the pump, each with its hysteresis.
-    fn keep_ready(&mut self) {
-        let coolant = self.plant.engine.coolant;
+    fn keep_ready(&mut self, dt: Duration) {
+        let coolant = self.measures.coolant;
         self.block_heater =
             !self.plant.engine.firing && (coolant < 38.0 || self.block_heater && coolant < 42.0);
-        let level = self.plant.tank.percent();
+        let level = self.measures.fuel_level;
         self.fuel_pump = level < 19.0 || self.fuel_pump && level < 25.0;
+        let alone = self.plant.lever("busbar.gensets") == Some(Position::Word("none"));
+        let missing = self.set.options.partner && alone;
+        self.partner_silent = if missing { self.partner_silent + dt } else { Duration::ZERO };
     }
 }
 
 impl Panel for DatakomDkg705 {
     fn step(&mut self, dt: Duration) {
-        let seconds = dt.as_secs_f64();
-        self.scene = if self.story { Scene::at(self.plant.time) } else { Scene::NOTHING };
-        if self.story {
-            self.plant.fail_mains(self.scene.mains_failed);
-        }
-        self.plant.tank.other_draw = self.scene.fuel_draw;
-
+        self.tell();
         // The plant first: the status then tells of contactors that have moved, in the same image.
-        self.plant.step(seconds, &self.controls);
-        self.mains.step(dt, &self.plant.mains);
+        self.plant.step(dt.as_secs_f64(), &self.controls);
+        self.measures = Measures::of(&self.plant, &self.set.options);
+        self.judge_mains(dt);
+        self.judge_load(dt);
+        self.exercise(dt);
         if self.alarms.shutdown() {
-            self.sequence.stop_now();
+            self.sequence.stop_now(&self.set);
         } else if self.alarms.load_dump() {
-            self.sequence.dump_load();
+            self.sequence.dump_load(&self.set);
         }
         let (demand, sensed) = (self.demand(), self.sensed());
-        self.sequence.step(dt, demand, sensed);
-        let operation = self.sequence.operation();
-        self.regulation.step(dt, operation, self.sequence.is_up_to_speed(), &mut self.plant);
-        self.ecu.step(seconds, &self.plant, &self.sequence);
-        self.keep_ready();
+        self.sequence.step(dt, demand, sensed, &self.set);
+        let task = Task {
+            operation: self.sequence.operation(),
+            regulating: self.sequence.is_up_to_speed(),
+            mains_keep: self.set.peak.as_ref().filter(|_| demand.parallel).map(|peak| peak.mains),
+        };
+        self.regulation.step(dt, task, &self.measures, &mut self.plant, &self.set);
+        self.ecu.step(dt, &self.plant, &self.sequence, self.set.options.ecu);
+        self.keep_ready(dt);
         self.controls = Controls {
             block_heater: self.block_heater,
             fuel_pump: self.fuel_pump,
-            ..self.sequence.controls(demand, sensed)
+            ..self.sequence.controls(demand, sensed, &self.set)
         };
-        let service_due = self.service_due();
-        let view = View { plant: &self.plant, sequence: &self.sequence, ecu: &self.ecu, service_due };
+        let view = View {
+            measures: &self.measures,
+            set: &self.set,
+            sequence: &self.sequence,
+            regulation: &self.regulation,
+            protections: &self.protections,
+            ecu: &self.ecu,
+            site: self.contacts(),
+        };
         self.alarms.step(dt, &view);
         self.clock.step(dt);
     }
@@ -281,15 +407,30 @@ impl Panel for DatakomDkg705 {
         }
     }
 
+    fn configure(&mut self, settings: &Settings) {
+        self.set = Parameters::of(settings);
+        self.measures = Measures::of(&self.plant, &self.set.options);
+    }
+
     fn levers(&self) -> &'static [Lever] {
-        plant::LEVERS
+        levers::all()
     }
 
     fn lever(&self, id: &str) -> Option<Position> {
-        self.plant.lever(id)
+        self.own_lever(id).or_else(|| self.plant.lever(id))
     }
 
     fn pull(&mut self, id: &str, to: Position) {
+        self.pull_own(id, to);
         self.plant.pull(id, to);
+    }
+
+    fn inject(&mut self, point: &str, bit: u16, active: bool) -> bool {
+        // The ECU's warning is the ECU's: it gets a fault to report.
+        if (point, bit) == ("warning_alarms_1", alarms::ECU_WARNING) {
+            self.ecu.sick = active;
+            return true;
+        }
+        self.alarms.inject(point, bit, active)
     }
 }

@@ -1,7 +1,7 @@
-//! What the unit can be doing, with the codes of register 003Fh.
+//! What the unit can be doing, with the codes of register 003Fh, and how it gets from one to the next.
 
 /// What the unit is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Operation {
     /// The engine stands.
     AtRest,
@@ -55,8 +55,15 @@ impl Operation {
         matches!(self, GensetContactorSynch | MainsContactorSynch | SoftToMains | SoftToGenset)
     }
 
-    /// The genset is led to the mains' frequency, voltage and angle.
+    /// The genset carries the load, or is about to.
+    pub(super) fn is_loaded(self) -> bool {
+        use Operation::*;
+        self.is_parallel() || matches!(self, GensetContactor | LoadOnGenset | SynchronizeToMains)
+    }
+
+    /// The genset is led to the mains' frequency, voltage and angle, until the contactor between them has closed.
     pub(super) fn is_synchronizing(self) -> bool {
-        matches!(self, Self::SynchronizeToGenset | Self::SynchronizeToMains)
+        use Operation::*;
+        matches!(self, SynchronizeToGenset | GensetContactorSynch | SynchronizeToMains | MainsContactorSynch)
     }
 }

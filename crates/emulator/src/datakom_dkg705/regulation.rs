@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use crate::plant::{HERTZ_PER_RPM, Plant, RATED_KVAR, RATED_KW, RATED_RPM, RATED_VOLTAGE};
 
+use super::measures::Measures;
 use super::operation::Operation;
+use super::parameters::{Control, Parameters, Transfer};
 
 /// What the full scale of an output adds to and takes from a set point: rpm and V.
 const GOV_SPAN: f64 = 90.0;
@@ -19,24 +21,37 @@ const GAIN: f64 = 1.0;
 /// Seconds in which an angle is worked off, and the greatest slip for it, Hz.
 const ANGLE_SECONDS: f64 = 3.0;
 const GREATEST_SLIP: f64 = 0.25;
-/// kW a second in a soft transfer.
-const RAMP: f64 = 8.0;
-
-/// Agreement needed to close a contactor between two live sources: degrees, Hz, V, and for how long.
-const ANGLE_WINDOW: f64 = 10.0;
-const SLIP_WINDOW: f64 = 0.2;
-const VOLTAGE_WINDOW: f64 = 8.0;
+/// For how long the two must agree before a contactor may close.
 const IN_STEP_AFTER: Duration = Duration::from_millis(300);
+/// Where an output stands that does not regulate.
+const REST: f64 = 0.5;
 
 /// Both outputs and what they follow.
 #[derive(Clone, Debug)]
 pub(super) struct Regulation {
-    /// 0 to 1; the middle leaves the genset's own set point alone.
-    governor: f64,
-    exciter: f64,
+    governor: Output,
+    exciter: Output,
     /// kW that the genset is to carry in parallel.
     base: f64,
     agreed: Duration,
+}
+
+/// 0 to 1; the middle leaves the genset's own set point alone.
+#[derive(Clone, Debug)]
+struct Output {
+    value: f64,
+    /// How long it has stood at an end of its range.
+    at_end: Duration,
+}
+
+/// What is wanted of the genset at this moment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Task {
+    pub(super) operation: Operation,
+    /// The genset is at its speed.
+    pub(super) regulating: bool,
+    /// kW that mains keep which only want help.
+    pub(super) mains_keep: Option<f64>,
 }
 
 impl Regulation {
@@ -44,15 +59,24 @@ impl Regulation {
     pub(super) fn new(plant: &mut Plant) -> Self {
         plant.engine.governor.droop = SPEED_DROOP;
         plant.excitation.droop = VOLTAGE_DROOP;
-        Self { governor: 0.5, exciter: 0.5, base: 0.0, agreed: Duration::ZERO }
+        Self { governor: Output::AT_REST, exciter: Output::AT_REST, base: 0.0, agreed: Duration::ZERO }
     }
 
     pub(super) fn governor(&self) -> f64 {
-        self.governor
+        self.governor.value
     }
 
     pub(super) fn exciter(&self) -> f64 {
-        self.exciter
+        self.exciter.value
+    }
+
+    /// Whether an output has been at its end for too long.
+    pub(super) fn governor_failed(&self, set: &Parameters) -> bool {
+        self.governor.at_end >= set.timers.control_fail
+    }
+
+    pub(super) fn exciter_failed(&self, set: &Parameters) -> bool {
+        self.exciter.at_end >= set.timers.control_fail
     }
 
     /// Whether genset and mains have agreed for long enough.
@@ -60,42 +84,69 @@ impl Regulation {
         self.agreed >= IN_STEP_AFTER
     }
 
-    /// Moves the outputs, and the plant's set points with them. `regulating` says that the genset is at its speed.
-    pub(super) fn step(&mut self, dt: Duration, operation: Operation, regulating: bool, plant: &mut Plant) {
-        let seconds = dt.as_secs_f64();
-        if regulating {
-            let (rpm, volts) = match plant.is_parallel() {
-                true => self.missing_in_parallel(seconds, operation, plant),
-                false => missing_alone(operation, plant),
-            };
-            self.governor = (self.governor + GAIN * seconds * rpm / (2.0 * GOV_SPAN)).clamp(0.0, 1.0);
-            self.exciter = (self.exciter + GAIN * seconds * volts / (2.0 * AVR_SPAN)).clamp(0.0, 1.0);
-        } else {
-            (self.governor, self.exciter) = (0.5, 0.5);
-        }
+    /// Moves the outputs, and the plant's set points with them.
+    pub(super) fn step(
+        &mut self,
+        dt: Duration,
+        task: Task,
+        measures: &Measures,
+        plant: &mut Plant,
+        set: &Parameters,
+    ) {
+        let transfer = &set.transfer;
+        let missing = task.regulating.then(|| match plant.is_parallel() {
+            true => self.missing_in_parallel(dt, task, measures, transfer),
+            false => missing_alone(task.operation, plant),
+        });
+        self.governor.step(dt, transfer.governor, missing.map(|(rpm, _)| rpm / (2.0 * GOV_SPAN)));
+        self.exciter.step(dt, transfer.exciter, missing.map(|(_, volts)| volts / (2.0 * AVR_SPAN)));
         if !plant.is_parallel() {
-            self.base = plant.genset.total_active();
+            self.base = measures.genset.total_active();
         }
-        plant.engine.governor.trim = (2.0 * self.governor - 1.0) * GOV_SPAN;
-        plant.excitation.trim = (2.0 * self.exciter - 1.0) * AVR_SPAN;
-        self.agreed = if agree(plant) { self.agreed + dt } else { Duration::ZERO };
+        plant.engine.governor.trim = (2.0 * self.governor.value - 1.0) * GOV_SPAN;
+        plant.excitation.trim = (2.0 * self.exciter.value - 1.0) * AVR_SPAN;
+        self.agreed = if agree(plant, set) { self.agreed + dt } else { Duration::ZERO };
     }
 
     /// rpm and V by which the set points miss the share of the load that the genset is to carry.
-    fn missing_in_parallel(&mut self, seconds: f64, operation: Operation, plant: &Plant) -> (f64, f64) {
-        let (mains, genset) = (&plant.mains, &plant.genset);
+    fn missing_in_parallel(
+        &mut self,
+        dt: Duration,
+        task: Task,
+        measures: &Measures,
+        transfer: &Transfer,
+    ) -> (f64, f64) {
+        let (mains, genset) = (&measures.mains, &measures.genset);
         let active = mains.total_active() + genset.total_active();
         let reactive = mains.total_reactive() + genset.total_reactive();
-        let target = match operation {
-            Operation::GensetContactorSynch | Operation::SoftToMains => 0.0,
+        let target = match (task.operation, task.mains_keep) {
+            (Operation::GensetContactorSynch | Operation::SoftToMains, _) => 0.0,
+            (_, Some(kept)) => (active - kept).max(0.0),
             _ => active,
         };
-        self.base += (target - self.base).clamp(-RAMP * seconds, RAMP * seconds);
+        let step = transfer.ramp * dt.as_secs_f64();
+        self.base += (target - self.base).clamp(-step, step);
         let part = if active > 0.0 { self.base / active } else { 0.0 };
         (
             SPEED_DROOP * (self.base - genset.total_active()) / RATED_KW,
             VOLTAGE_DROOP * (part * reactive - genset.total_reactive()) / RATED_KVAR,
         )
+    }
+}
+
+impl Output {
+    const AT_REST: Self = Self { value: REST, at_end: Duration::ZERO };
+
+    /// `missing` is a part of the output's range, none while it does not regulate.
+    fn step(&mut self, dt: Duration, control: Control, missing: Option<f64>) {
+        let Some(missing) = missing.filter(|_| control.enabled) else {
+            *self = Self::AT_REST;
+            return;
+        };
+        let towards = if control.reversed { -missing } else { missing };
+        self.value = (self.value + GAIN * dt.as_secs_f64() * towards).clamp(0.0, 1.0);
+        let at_end = self.value <= 0.0 || self.value >= 1.0;
+        self.at_end = if at_end { self.at_end + dt } else { Duration::ZERO };
     }
 }
 
@@ -111,10 +162,45 @@ fn missing_alone(operation: Operation, plant: &Plant) -> (f64, f64) {
     (rpm - plant.engine.speed, volts - genset.average_voltage())
 }
 
-fn agree(plant: &Plant) -> bool {
-    let (mains, genset) = (&plant.mains, &plant.genset);
-    let live = mains.average_voltage().min(genset.average_voltage()) > 100.0;
-    live && plant.angle().abs() < ANGLE_WINDOW
-        && (mains.frequency - genset.frequency).abs() < SLIP_WINDOW
-        && (mains.average_voltage() - genset.average_voltage()).abs() < VOLTAGE_WINDOW
+/// Whether a contactor may close between the two.
+fn agree(plant: &Plant, set: &Parameters) -> bool {
+    let (transfer, stands) = (&set.transfer, plant.synchronism());
+    stands.live
+        && (stands.same_order || set.mains.any_order)
+        && stands.angle.abs() < transfer.angle
+        && stands.slip.abs() < transfer.slip
+        && stands.voltage.abs() < transfer.volts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TENTH: Duration = Duration::from_millis(100);
+    const USUAL: Control = Control { enabled: true, reversed: false };
+
+    fn after(control: Control, missing: Option<f64>, tenths: u32) -> Output {
+        let mut output = Output { value: 0.6, at_end: TENTH };
+        (0..tenths).for_each(|_| output.step(TENTH, control, missing));
+        output
+    }
+
+    #[test]
+    fn an_output_goes_where_it_is_needed_unless_it_is_off_or_the_wrong_way_round() {
+        assert!((after(USUAL, Some(0.1), 10).value - 0.7).abs() < 1e-9);
+        assert!((after(Control { reversed: true, ..USUAL }, Some(0.1), 10).value - 0.5).abs() < 1e-9);
+        for (control, missing) in [(Control { enabled: false, ..USUAL }, Some(0.1)), (USUAL, None)] {
+            let output = after(control, missing, 10);
+            assert_eq!((output.value, output.at_end), (REST, Duration::ZERO));
+        }
+    }
+
+    #[test]
+    fn an_output_that_stays_at_its_end_is_counted_until_it_leaves_it() {
+        let mut output = after(USUAL, Some(-1.0), 20);
+        assert_eq!(output.value, 0.0);
+        assert!(output.at_end >= Duration::from_secs(1), "{output:?}");
+        output.step(TENTH, USUAL, Some(0.5));
+        assert_eq!(output.at_end, Duration::ZERO);
+    }
 }

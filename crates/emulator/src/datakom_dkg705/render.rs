@@ -6,16 +6,15 @@ use crate::bank::Bank;
 use crate::plant::Feed;
 
 use super::operation::Operation;
-use super::settings::SITE;
-use super::{CLOCK, DatakomDkg705, MODE_KEYS, Mode};
+use super::{CLOCK, DatakomDkg705, MODE_KEYS, Mode, mains};
 
-/// Below this the external supply has failed, V.
-const EXTERNAL_DC_FAIL: f64 = 20.0;
+/// The bit of a phase order that is wrong.
+const WRONG: u16 = 7;
 
 /// Stores all of them.
 pub(super) fn registers(unit: &DatakomDkg705, bank: &mut Bank) {
-    feed(&unit.plant.mains, &MAINS, bank);
-    feed(&unit.plant.genset, &GENSET, bank);
+    feed(&unit.measures.mains, &MAINS, bank);
+    feed(&unit.measures.genset, &GENSET, bank);
     bank.numbers(CLOCK, 1, unit.clock.parts().map(f64::from));
     engine(unit, bank);
     for (address, word) in (0x0032..).zip(unit.alarms.words()) {
@@ -24,9 +23,7 @@ pub(super) fn registers(unit: &DatakomDkg705, bank: &mut Bank) {
     outputs(unit, bank);
     state(unit, bank);
     ecu(unit, bank);
-    limits(bank);
-    timers(bank);
-    options(bank);
+    parameters(unit, bank);
 }
 
 /// Where a feed's registers stand; phases follow each other.
@@ -71,7 +68,7 @@ fn feed(feed: &Feed, at: &FeedRegisters, bank: &mut Bank) {
     bank.numbers(at.line_voltage, 1, feed.line_voltage());
     bank.numbers(at.current, 1, feed.current());
     bank.number(at.frequency, feed.frequency);
-    bank.bits(at.phase_order, BitSet::EMPTY);
+    bank.bits(at.phase_order, set([(WRONG, mains::is_order_wrong(feed))]));
     bank.number(at.active, feed.total_active());
     bank.number(at.apparent, feed.total_apparent());
     bank.number(at.reactive, feed.total_reactive());
@@ -81,16 +78,15 @@ fn feed(feed: &Feed, at: &FeedRegisters, bank: &mut Bank) {
 }
 
 fn engine(unit: &DatakomDkg705, bank: &mut Bank) {
-    let plant = &unit.plant;
-    let [battery, external] = &plant.batteries;
-    bank.number(0x002A, plant.engine.speed);
-    bank.number(0x002B, plant.engine.oil_pressure);
-    bank.number(0x002C, plant.engine.coolant);
-    bank.number(0x002D, plant.tank.percent());
-    bank.number(0x002E, plant.engine.oil);
-    bank.number(0x002F, battery.voltage);
-    bank.number(0x0030, (100.0 * battery.charge_input / battery.voltage).clamp(0.0, 100.0));
-    bank.number(0x0031, external.voltage);
+    let measures = &unit.measures;
+    bank.number(0x002A, measures.speed);
+    bank.number(0x002B, measures.oil_pressure);
+    bank.number(0x002C, measures.coolant);
+    bank.number(0x002D, measures.fuel_level);
+    bank.number(0x002E, measures.oil);
+    bank.number(0x002F, measures.battery);
+    bank.number(0x0030, (100.0 * measures.charge_input / measures.battery.max(1.0)).clamp(0.0, 100.0));
+    bank.number(0x0031, measures.external_dc);
 }
 
 fn outputs(unit: &DatakomDkg705, bank: &mut Bank) {
@@ -98,64 +94,78 @@ fn outputs(unit: &DatakomDkg705, bank: &mut Bank) {
     let stop = unit.sequence.operation() == Operation::Stopping;
     let contactor = controls.genset_breaker || controls.mains_breaker;
     let auto_ready = unit.mode == Mode::Auto && !unit.is_locked();
-    let external_dc_fail = plant.batteries[1].voltage < EXTERNAL_DC_FAIL;
+    let external_dc_fail = unit.measures.external_dc < unit.set.limits.low_external_dc;
+    let preheats = unit.sequence.is_preheating(&unit.set);
+    let exercises = unit.exerciser.is_on();
+    let is_master = unit.set.options.partner && plant.engine.is_running();
     let flash = alarms.any() && plant.time.fract() < 0.5;
 
     let relays = [
-        (1, alarms.horn()),
-        (2, controls.starter),
-        (3, controls.idle),
-        (4, controls.genset_breaker),
-        (5, controls.mains_breaker),
-        (6, controls.fuel),
-        (7, stop),
-    ];
-    let module_1 = [
-        (0, unit.sequence.is_preheating()),
-        (1, alarms.any()),
-        (2, contactor),
-        (3, auto_ready),
-        (4, controls.fuel_pump),
-        (5, unit.scene.exerciser),
-        (6, external_dc_fail),
-        (7, flash),
-    ];
-    let functions_1 = [
-        (1, unit.sequence.is_preheating()),
+        (1, preheats),
         (2, controls.starter),
         (3, alarms.horn()),
         (4, controls.genset_breaker),
         (5, controls.mains_breaker),
         (6, controls.fuel),
         (7, stop),
+    ];
+    let modules = [
+        (0, controls.idle),
+        (1, alarms.any()),
+        (2, contactor),
+        (3, auto_ready),
+        (4, controls.fuel_pump),
+        (5, exercises),
+        (6, external_dc_fail),
+        (7, flash),
+        (8, unit.sheds_load),
+        (9, is_master),
+    ];
+    let functions_1 = [
+        (1, preheats),
+        (2, controls.starter),
+        (3, alarms.horn()),
+        (4, controls.genset_breaker),
+        (5, controls.mains_breaker),
+        (6, controls.fuel),
+        (7, stop),
+        (8, unit.sheds_load),
         (9, alarms.any()),
         (10, contactor),
         (11, auto_ready),
-        (13, unit.scene.exerciser),
+        (12, is_master),
+        (13, exercises),
         (14, controls.fuel_pump),
     ];
     let functions_2 = [(0, external_dc_fail), (1, controls.idle), (5, flash)];
     bank.bits(0x0039, set(relays));
-    bank.bits(0x003A, set(module_1));
+    bank.bits(0x003A, set(modules));
     bank.bits(0x003B, set(functions_1));
     bank.bits(0x003C, set(functions_2));
 }
 
 fn state(unit: &DatakomDkg705, bank: &mut Bank) {
     let plant = &unit.plant;
-    let mode = set([(unit.mode.bit(), true)]);
-    bank.bits(0x003D, mode);
+    bank.bits(0x003D, set([(unit.mode.bit(), true)]));
     bank.integer(0x003E, unit.timer().as_millis().div_ceil(1000) as i64);
     bank.code(0x003F, unit.sequence.operation().code());
-    bank.bits(MODE_KEYS, mode);
+    bank.bits(MODE_KEYS, set([(unit.last_key.bit(), true)]));
     bank.number(0x0041, 100.0 * unit.regulation.governor());
     bank.number(0x0042, 100.0 * unit.regulation.exciter());
-    let live = plant.mains.average_voltage().min(plant.genset.average_voltage()) > 100.0;
-    bank.number(0x0043, if live { plant.angle() } else { 0.0 });
+    let stands = plant.synchronism();
+    bank.number(0x0043, if stands.live { stands.angle } else { 0.0 });
 }
+
+/// The J1939 block: 0 where the engine is not heard.
+const ECU: std::ops::RangeInclusive<u16> = 0x0060..=0x007F;
+const SECOND_OF_ENGINE_HOURS: u16 = 0x0064;
 
 fn ecu(unit: &DatakomDkg705, bank: &mut Bank) {
     let (plant, engine, ecu) = (&unit.plant, &unit.plant.engine, &unit.ecu);
+    if ecu.cut || !unit.set.options.ecu {
+        ECU.filter(|address| *address != SECOND_OF_ENGINE_HOURS).for_each(|address| bank.absent(address));
+        return;
+    }
     bank.number(0x0060, engine.speed);
     bank.number(0x0061, engine.coolant);
     bank.number(0x0062, engine.oil_pressure);
@@ -177,74 +187,22 @@ fn ecu(unit: &DatakomDkg705, bank: &mut Bank) {
     }
 }
 
-fn limits(bank: &mut Bank) {
-    let site = &SITE;
-    for (address, value) in [
-        (0x1005, site.low_oil_pressure_shutdown),
-        (0x1006, site.low_oil_pressure_warning),
-        (0x1007, site.high_temperature_shutdown),
-        (0x1008, site.high_temperature_warning),
-        (0x1009, site.high_frequency_shutdown),
-        (0x100A, site.high_frequency_warning),
-        (0x100B, site.low_frequency_shutdown),
-        (0x100C, site.low_frequency_warning),
-        (0x100D, site.high_voltage_shutdown),
-        (0x100E, site.low_voltage_shutdown),
-        (0x100F, site.mains_voltage_high),
-        (0x1010, site.mains_voltage_low),
-        (0x1011, site.hysteresis_voltage),
-        (0x1012, site.high_battery_shutdown),
-        (0x1013, site.high_battery_warning),
-        (0x1014, site.low_battery_warning),
-        (0x1015, site.overcurrent),
-        (0x1016, site.excess_power),
-        (0x1018, site.start_attempts.into()),
-        (0x1019, site.heating_temperature),
-    ] {
-        bank.number(address, value);
+fn parameters(unit: &DatakomDkg705, bank: &mut Bank) {
+    for (point, value) in &unit.set.numbers {
+        match (point.field, Number::from_f64(*value, 6)) {
+            // Two of them share a register.
+            (Some(_), Some(number)) => bank.put(&point.id, &Value::Number(number)),
+            _ => bank.number(point.address, *value),
+        }
     }
-}
-
-fn timers(bank: &mut Bank) {
-    let site = &SITE;
-    for (address, seconds) in [
-        (0x1000, site.idle),
-        (0x1017, site.overload),
-        (0x101A, site.stop),
-        (0x101B, site.crank),
-        (0x101C, site.preheat),
-        (0x101D, site.wait_between_starts),
-        (0x101E, site.wait_before_fuel),
-        (0x101F, site.cooldown),
-        (0x1020, site.mains_waiting),
-        (0x1021, site.genset_contactor),
-        (0x1022, site.mains_contactor),
-        (0x1023, site.heating),
-        (0x1024, site.horn),
-    ] {
-        bank.integer(address, seconds as i64);
-    }
-}
-
-fn options(bank: &mut Bank) {
-    let site = &SITE;
-    bank.integer(0x1001, site.current_transformer.into());
-    bank.bits(0x1002, BitSet::EMPTY);
-    // Governor and voltage regulator are both connected.
-    let transfer = [(0, site.no_break_transfer), (1, site.soft_transfer), (2, true), (3, true)];
-    bank.bits(0x1025, set(transfer));
-    // One register holds two points here: heated by the timer alone, and the bits above it.
-    bank.put("engine_heating", &Value::Choice { code: 0 });
-    bank.put("operation_mode_2", &Value::Bits(set([(2, true), (5, site.emergency_backup), (6, true)])));
-    bank.number(0x1027, site.service_hours);
-    bank.number(0x1028, site.service_days);
-    // At ten o'clock, for three steps of ten minutes, on load, every week.
-    bank.integer(0x102A, 10);
-    bank.number(0x102B, 0.3);
-    bank.put("exercise_period", &Value::Choice { code: 1 });
-    bank.put("operation_mode_3", &Value::Bits(set([(2, true), (6, true)])));
-    bank.put("ecu_engine_brand", &Value::Number(Number::integer(2)));
-    bank.put("ecu_engine_model", &Value::Number(Number::integer(5)));
+    let words = &unit.set.words;
+    bank.bits(0x1002, words.multi_genset);
+    bank.bits(0x1025, words.mode_1);
+    // A choice and a word share a register, twice.
+    bank.put("engine_heating", &Value::Choice { code: words.heating.into() });
+    bank.put("operation_mode_2", &Value::Bits(words.mode_2));
+    bank.put("exercise_period", &Value::Choice { code: words.exercise_period.into() });
+    bank.put("operation_mode_3", &Value::Bits(words.mode_3));
 }
 
 fn set(bits: impl IntoIterator<Item = (u16, bool)>) -> BitSet {
@@ -254,12 +212,13 @@ fn set(bits: impl IntoIterator<Item = (u16, bool)>) -> BitSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Settings;
 
     /// What stood there before shows through wherever a point is forgotten.
     #[test]
     fn every_point_is_stored() {
         let profile = busbar_profile::builtin("datakom-dkg705").unwrap();
-        let unit = DatakomDkg705::new(1, false);
+        let unit = DatakomDkg705::new(1, false, &Settings::of(profile));
         let images = [0x0000, 0xFFFF].map(|word| {
             let mut bank = Bank::new(profile);
             bank.fill(word);

@@ -7,6 +7,9 @@ use crate::MAX_SPEED;
 /// A clock that was held up (a sleeping laptop, a debugger) does not make up for more than this.
 const MOST_LAPSE: Duration = Duration::from_secs(2);
 
+/// So much simulated time passes at once: clients wait no longer than that takes.
+pub(super) const STRIDE: Duration = Duration::from_secs(10);
+
 /// How a simulated clock runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -65,12 +68,17 @@ impl Clock {
         Ok(())
     }
 
-    /// So much real time has passed; gives the simulated time that it is now.
-    pub(super) fn lapse(&mut self, real: Duration) -> Duration {
-        if self.pace.paused {
-            return self.simulated;
+    /// How much simulated time is to pass in so much real time.
+    pub(super) fn due(&self, real: Duration) -> Duration {
+        match self.pace.paused {
+            true => Duration::ZERO,
+            false => real.min(MOST_LAPSE).mul_f64(self.pace.speed),
         }
-        self.step(real.min(MOST_LAPSE).mul_f64(self.pace.speed))
+    }
+
+    /// Lets simulated time pass unless it is paused; gives the time that it is now.
+    pub(super) fn run(&mut self, by: Duration) -> Duration {
+        self.step(if self.pace.paused { Duration::ZERO } else { by })
     }
 
     /// Lets simulated time pass, paused or not; gives the time that it is now.
@@ -89,14 +97,16 @@ mod tests {
     #[test]
     fn it_runs_stands_and_is_stepped() {
         let mut clock = Clock::new(60.0);
-        assert_eq!(clock.lapse(SECOND), 60 * SECOND);
+        assert_eq!(clock.due(SECOND), 60 * SECOND);
+        assert_eq!(clock.run(60 * SECOND), 60 * SECOND);
         clock.pause(true);
-        assert_eq!(clock.lapse(SECOND), 60 * SECOND);
+        assert_eq!(clock.due(SECOND), Duration::ZERO);
+        assert_eq!(clock.run(SECOND), 60 * SECOND, "whatever was due before");
         assert_eq!(clock.step(SECOND), 61 * SECOND);
         clock.run_at(2.0).unwrap();
         clock.pause(false);
-        assert_eq!(clock.lapse(SECOND), 63 * SECOND);
-        assert_eq!(clock.lapse(1000 * SECOND), 67 * SECOND, "it was held up");
+        assert_eq!(clock.due(SECOND), 2 * SECOND);
+        assert_eq!(clock.due(1000 * SECOND), 4 * SECOND, "it was held up");
     }
 
     #[test]

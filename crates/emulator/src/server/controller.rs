@@ -5,12 +5,9 @@ use std::time::Duration;
 
 use busbar_link::Endpoint;
 
-use super::clock::{Pace, SpeedError};
+use super::clock::{Pace, STRIDE, SpeedError};
 use super::door::Served;
 use crate::device::Device;
-
-/// So much simulated time passes at once while a clock is stepped: clients wait no longer than that takes.
-const STRIDE: Duration = Duration::from_secs(10);
 
 /// One controller of an [`Emulation`](crate::Emulation) that runs. It stays as it is when that has ended.
 #[derive(Clone, Debug)]

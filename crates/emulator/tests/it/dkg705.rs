@@ -1,5 +1,8 @@
 //! The DKG-705 as a client sees it: its wire rules, and its commands with their proofs.
 
+mod alarms;
+mod contactors;
+mod parameters;
 mod registers;
 
 use busbar_emulator::{Config, StartError};

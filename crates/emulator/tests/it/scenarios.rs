@@ -39,6 +39,13 @@ scenarios! {
     dkg705_mains_failure: "dkg705-mains-failure.toml",
     dkg705_short_dip: "dkg705-short-dip.toml",
     dkg705_soft_transfer: "dkg705-soft-transfer.toml",
+    injected_alarms: "injected-alarms.toml",
+    bus_tie_with_one_source_dead: "bus-tie.toml",
+    tie_that_will_not_close: "tie-will-not-close.toml",
+    load_shedding_stepwise: "load-shedding.toml",
+    both_sources_dead: "both-sources-dead.toml",
+    switch_in_test_position: "switch-in-test-position.toml",
+    remote_transfer: "remote-transfer.toml",
     compressor_day: "compressor-day.toml",
     compressor_hot_discharge: "compressor-hot-discharge.toml",
     compressor_locked: "compressor-locked.toml",
@@ -49,6 +56,17 @@ fn every_file_is_played() {
     let files = fs::read_dir(folder()).unwrap();
     let names: BTreeSet<_> = files.map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
     assert_eq!(names, PLAYED.iter().map(|name| (*name).to_owned()).collect());
+}
+
+#[test]
+fn the_documentation_lists_every_file() {
+    let page = fs::read_to_string(root().join("docs/scenarios.md")).unwrap();
+    for name in PLAYED {
+        let text = fs::read_to_string(folder().join(name)).unwrap();
+        let scenario = Scenario::parse(name, &text).unwrap();
+        let row = format!("| `{name}` | `{}` | {} |", scenario.controller(), scenario.title());
+        assert!(page.contains(&row), "docs/scenarios.md lacks this row:\n{row}");
+    }
 }
 
 #[test]

@@ -59,7 +59,7 @@ pub(crate) fn parse(file_name: &str, text: &str, vocabulary: &Vocabulary) -> Res
     let coils = check.coils();
     let joined = check.joined(&layout);
     let commands = check.commands(&layout, &joined, wire.as_ref());
-    let settings = check.settings();
+    let settings = check.settings(&layout);
     let Check { collector, .. } = check;
     let (Some(wire), true) = (wire, collector.is_empty()) else {
         return Err(collector.into_findings());

@@ -113,6 +113,9 @@ async fn bodies_that_are_none_are_refused() {
         let problem = send("PUT", "dkg/levers/mains", json, body.to_owned()).await.problem(400);
         assert!(problem.starts_with("the body is not what is needed: "), "{body}: {problem}");
     }
+    for body in ["{\"speed\":null}", "{\"paused\":1}", "{\"step\":1}", "{\"speed\":1,\"speed\":2}"] {
+        send("PUT", "dkg/clock", json, body.to_owned()).await.problem(400);
+    }
     let large = format!("{{\"position\":\"{}\"}}", "a".repeat(10_000));
     let problem = send("PUT", "dkg/levers/mains", json, large).await.problem(413);
     assert!(problem.contains("8192 bytes"), "{problem}");
