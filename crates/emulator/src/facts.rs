@@ -19,6 +19,8 @@ pub enum Fact {
     Number(Number),
     /// A canonical word of a signal, or the id of a point's choice.
     Word(&'static str),
+    /// A state that the controller has a label for and the vocabulary no word: none of the words.
+    NoWord(&'static str),
     /// A single bit.
     Flag(bool),
     /// Nobody can tell: the sensor is absent, the code has no name, or the controller is restarting.
@@ -30,6 +32,7 @@ impl fmt::Display for Fact {
         match self {
             Self::Number(number) => number.fmt(f),
             Self::Word(word) => f.write_str(word),
+            Self::NoWord(label) => write!(f, "none ({label})"),
             Self::Flag(true) => f.write_str("yes"),
             Self::Flag(false) => f.write_str("no"),
             Self::Unknown => f.write_str("unknown"),
@@ -38,13 +41,13 @@ impl fmt::Display for Fact {
 }
 
 impl Serialize for Fact {
-    /// A number, a text, true or false; null for what is unknown.
+    /// A number, a text, true or false; null for what is unknown or has no word.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Number(number) => number.serialize(serializer),
             Self::Word(word) => serializer.serialize_str(word),
             Self::Flag(flag) => serializer.serialize_bool(*flag),
-            Self::Unknown => serializer.serialize_none(),
+            Self::NoWord(_) | Self::Unknown => serializer.serialize_none(),
         }
     }
 }
@@ -209,8 +212,11 @@ fn plain(point: &'static Point, value: &Value, as_signal: bool) -> Option<Fact> 
         Value::Number(number) => Some(Fact::Number(*number)),
         Value::Choice { code } => {
             let choice = point.choice(*code)?;
-            let word = if as_signal { choice.state.as_deref()? } else { &choice.id };
-            Some(Fact::Word(word))
+            Some(match (as_signal, choice.state.as_deref()) {
+                (true, Some(word)) => Fact::Word(word),
+                (true, None) => Fact::NoWord(&choice.label),
+                (false, _) => Fact::Word(&choice.id),
+            })
         }
         // One bit for each word, or one bit for two.
         Value::Bits(bits) => point.bits.iter().find_map(|bit| {
@@ -297,17 +303,21 @@ fn words(point: &'static Point) -> Vec<&'static str> {
     choices.chain(bits).collect()
 }
 
-/// What was perhaps meant: of a wrong bit, another one of its point.
+/// What was perhaps meant: of a wrong bit another one of its point, of a bit of a wrong point the one that has it.
 fn nearest_name(profile: &'static Profile, name: &str) -> Option<String> {
-    if let Some((point, bit)) = name.split_once('.')
-        && let Some(point) = profile.point(point)
-    {
-        let bit = nearest(bit, point.bits.iter().map(|bit| bit.id.as_str()))?;
-        return Some(format!("{}.{bit}", point.id));
+    let full = |point: &Point, bit: &str| format!("{}.{bit}", point.id);
+    let readable = || profile.points.iter().filter(|point| point.access.is_readable());
+    let (point, bit) = name.split_once('.').unwrap_or(("", name));
+    if let Some(point) = profile.point(point) {
+        let meant = nearest(bit, point.bits.iter().map(|bit| bit.id.as_str()))?;
+        return Some(full(point, meant));
+    }
+    let mut having = readable().filter(|point| point.bit_by_id(bit).is_some());
+    if let (Some(point), None) = (having.next(), having.next()) {
+        return Some(full(point, bit));
     }
     let signals = Subject::signals(profile).map(|subject| subject.name);
-    let points = profile.points.iter().filter(|point| point.access.is_readable());
-    let names: Vec<_> = signals.chain(points.map(|point| point.id.clone())).collect();
+    let names: Vec<_> = signals.chain(readable().map(|point| point.id.clone())).collect();
     nearest(name, names.iter().map(String::as_str)).map(str::to_owned)
 }
 
@@ -352,6 +362,7 @@ mod tests {
     #[test]
     fn bits_that_stand_for_words_and_joined_hours_are_facts_too() {
         let dkg = device("datakom-dkg705", &[("operating_mode", "load_test")]);
+        assert_eq!(said(&dkg, "state.engine"), "none (Load on mains)", "a state without a word");
         assert_eq!(said(&dkg, "mode"), "load_test");
         assert_eq!(said(&device("datakom-dkg705", &[("operating_mode", "none")]), "mode"), "unknown");
         let hat = |bits| device("smartgen-hat821si", &[("common_status", bits)]);
@@ -366,7 +377,7 @@ mod tests {
                     FactKind::Flag => matches!(fact, Fact::Flag(_)),
                     FactKind::Words(words) => match &fact {
                         Fact::Word(word) => words.contains(word),
-                        fact => *fact == Fact::Unknown,
+                        fact => matches!(fact, Fact::NoWord(_) | Fact::Unknown),
                     },
                 };
                 assert!(fits, "{} {}: {fact:?} is no {:?}", profile.key, subject.name(), subject.kind());
@@ -384,10 +395,17 @@ mod tests {
 
     #[test]
     fn a_wrong_name_gets_the_nearest() {
-        let find = |name| {
-            let profile = busbar_profile::builtin("datakom-d").unwrap();
+        let of = |key, name| {
+            let profile = busbar_profile::builtin(key).unwrap();
             Subject::find(profile, name).unwrap_err().to_string()
         };
+        let find = |name| of("datakom-d", name);
+        for name in ["shutdown_alarms.fail_to_start", "fail_to_start"] {
+            assert_eq!(
+                of("datakom-dkg705", name),
+                format!("the controller has no `{name}`; did you mean `shutdown_alarms_2.fail_to_start`?")
+            );
+        }
         for (name, sentence) in [
             ("state.engin", "the controller has no `state.engin`; did you mean `state.engine`?"),
             ("unitmode", "the controller has no `unitmode`; did you mean `unit_mode`?"),

@@ -62,6 +62,7 @@ impl Condition {
             },
             Self::Word { subject, word, equal } => match subject.fact(device) {
                 Fact::Word(fact) => Some((fact == *word) == *equal),
+                Fact::NoWord(_) => Some(!equal),
                 _ => None,
             },
             Self::Not(condition) => condition.judge(device).map(|holds| !holds),

@@ -204,6 +204,19 @@ fn conditions_bind_as_people_read_them() {
 }
 
 #[test]
+fn a_state_without_a_word_is_none_of_the_words() {
+    let device = Device::new(&Config { profile: "datakom-dkg705".to_owned(), ..Config::default() }).unwrap();
+    for (text, holds) in [
+        ("state.engine == cranking", false),
+        ("state.engine != cranking", true),
+        ("not state.engine == cranking", true),
+        ("operation_status == load_on_mains", true),
+    ] {
+        assert_eq!(parse::condition(device.profile(), text).unwrap().holds(&device), holds, "{text}");
+    }
+}
+
+#[test]
 fn a_command_is_judged_by_its_verdict() {
     let order = |lines: &str| checks(&play(&format!("[[steps]]\nat = \"1s\"\n{lines}\n")));
     assert_eq!(order("command = \"stop\""), ["1.1 held of the command stop that it is done"]);

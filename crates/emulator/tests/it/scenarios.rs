@@ -46,6 +46,8 @@ scenarios! {
     both_sources_dead: "both-sources-dead.toml",
     switch_in_test_position: "switch-in-test-position.toml",
     remote_transfer: "remote-transfer.toml",
+    dkg705_weekly_exercise: "dkg705-weekly-exercise.toml",
+    dkg705_two_attempts: "dkg705-two-attempts.toml",
     compressor_day: "compressor-day.toml",
     compressor_hot_discharge: "compressor-hot-discharge.toml",
     compressor_locked: "compressor-locked.toml",
