@@ -2,6 +2,7 @@
 
 mod alarms;
 mod auto;
+mod chance;
 mod display;
 mod parallel;
 mod share;

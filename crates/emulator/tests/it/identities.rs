@@ -4,9 +4,9 @@ use busbar_emulator::Config;
 
 use crate::site::Site;
 
-const SOURCES: [&str; 2] = ["mains", "genset"];
+pub(crate) const SOURCES: [&str; 2] = ["mains", "genset"];
 const QUANTITIES: [&str; 3] = ["active_power", "reactive_power", "apparent_power"];
-const GROWING: [&str; 13] = [
+pub(crate) const GROWING: [&str; 13] = [
     "genset_runs",
     "genset_cranks",
     "genset_loadings",
@@ -78,7 +78,7 @@ fn voltages_agree(site: &Site, source: &str, place: &str) {
     );
 }
 
-fn powers_agree(site: &Site, source: &str, place: &str) {
+pub(crate) fn powers_agree(site: &Site, source: &str, place: &str) {
     let [p, q, s] =
         QUANTITIES.map(|quantity| [1, 2, 3].map(|n| site.number(&format!("{source}_l{n}_{quantity}"))));
     let [total_p, total_q, total_s] = QUANTITIES.map(|quantity| site.number(&format!("{source}_{quantity}")));

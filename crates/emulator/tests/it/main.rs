@@ -8,6 +8,7 @@ mod dkg705;
 mod golden;
 mod hat821si;
 mod identities;
+mod levers;
 #[cfg(target_os = "linux")]
 mod lines;
 mod openapi;

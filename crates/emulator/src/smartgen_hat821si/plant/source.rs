@@ -298,6 +298,7 @@ mod tests {
             frequency: 50.0,
             active: [800.0, 790.0, 780.0],
             reactive: [300.0; 3],
+            ..Feed::default()
         };
         source
     }
