@@ -185,6 +185,33 @@ test('a point is pinned and let go, and what cannot be is told in a sentence', a
   await page.close()
 })
 
+test('of many levers the one that is looked for is pulled, and an injected alarm is told to the operator', async () => {
+  const page = await open(imitation('genset-1'))
+  const levers = page.locator('#levers').getByRole('group')
+  await levers.first().waitFor()
+  const before = await levers.count()
+  expect(before).toBeGreaterThan(20)
+  await page.getByRole('searchbox', { name: 'Find a lever' }).fill('radiator')
+  await expect.poll(() => levers.count()).toBe(1)
+  await levers.getByRole('button', { name: 'blocked' }).click()
+  await page.getByText('Pulled: Radiator (blocked)').waitFor()
+  expect(await levers.getByRole('button', { name: 'blocked' }).getAttribute('aria-pressed')).toBe('true')
+  await press(page, 'Clear the radiator')
+  await page.getByText('Nothing is pulled.').waitFor()
+
+  await page.getByLabel('Alarm', { exact: true }).fill('warning_alarms.high_oil_temperature')
+  await press(page, 'Inject')
+  await page.getByRole('list', { name: 'Injected alarms' }).getByText('(warning)').waitFor()
+  const alarms = async () =>
+    (await page.request.get(new URL('api/v1/alarms', demo.address).href)).json() as Promise<{ id: string }[]>
+  const told = async () => (await alarms()).some(({ id }) => id === 'high_oil_temperature')
+  await expect.poll(told, { timeout: REACTS_MS }).toBe(true)
+  await page.getByRole('button', { name: /^Let .* go$/ }).click()
+  await expect.poll(told, { timeout: REACTS_MS }).toBe(false)
+  expect(complaints).toEqual([])
+  await page.close()
+})
+
 test('an imitation with a token asks for it', async () => {
   const one = await Controller.start('datakom-d', 'tcp://127.0.0.1:0', '--control', '127.0.0.1:0')
   const page = await browser.newPage({ viewport: PHONE })

@@ -91,7 +91,8 @@ const pull = (lever, position) =>
 const worded = (lever, position) =>
   typeof position === 'number' ? `${round(position)} ${unitOf(lever.numbers)}`.trim() : spaced(position)
 /** A unit as people write it. */
-const unitOf = (numbers) => ({ degC: '°C', deg: '°' })[numbers?.unit] ?? numbers?.unit ?? ''
+const unitOf = (numbers) =>
+  ({ degC: '°C', deg: '°', 'm3/min': 'm³/min' })[numbers?.unit] ?? numbers?.unit ?? ''
 const spaced = (word) => word.replaceAll('_', ' ')
 const round = (number) => Math.round(number * 100) / 100
 const isHealthy = (lever) => lever.words.length === 0 || lever.position === lever.words[0].id
@@ -173,6 +174,7 @@ function showSwitches() {
 
 function showLevers() {
   fill($('levers'), [shown.id], () => shown.levers.map(leverForm))
+  find()
   $('levers').parentElement.hidden = shown.levers.length === 0
   for (const lever of shown.levers) {
     const form = document.querySelector(`#levers [data-lever="${lever.id}"]`)
@@ -182,6 +184,13 @@ function showLevers() {
     for (const button of form.querySelectorAll('[data-word]'))
       button.setAttribute('aria-pressed', button.dataset.word === lever.position)
   }
+}
+
+/** Shows the levers whose name, id or words hold what is looked for. */
+function find() {
+  const wanted = $('find').value.trim().toLowerCase()
+  for (const form of document.querySelectorAll('#levers [data-lever]'))
+    form.hidden = !`${form.textContent} ${form.dataset.lever}`.toLowerCase().includes(wanted)
 }
 
 function leverForm(lever) {
@@ -356,6 +365,7 @@ $('token').addEventListener('submit', (event) => {
   void refresh().catch(failed)
 })
 
+$('find').addEventListener('input', find)
 addEventListener('hashchange', () => void refresh().catch(failed))
 document.addEventListener('click', () => tell(''), { capture: true })
 void live()

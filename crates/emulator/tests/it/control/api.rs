@@ -120,6 +120,25 @@ async fn every_alarm_is_listed_with_those_that_are_injected() {
 }
 
 #[tokio::test]
+async fn an_injected_alarm_is_the_panels_own_until_it_is_let_go() {
+    let bench = Bench::new().await;
+    let alarm = "shutdown_alarms.low_oil_pressure";
+    bench.step(1.0).await;
+    assert_eq!(bench.value("d", alarm).await, false);
+    let path = format!("d/alarms/{alarm}");
+    let injected = bench.ask(Method::PUT, &path, None).await.json();
+    assert_eq!((&injected[0]["id"], &injected[0]["class"]), (&json!(alarm), &json!("shutdown")));
+    assert_eq!(bench.ask(Method::PUT, &path, None).await.json(), injected, "once");
+    bench.step(1.0).await;
+    assert_eq!(bench.value("d", alarm).await, true);
+    assert_eq!(bench.get("d").await["injected"], injected);
+    let listed = bench.get("d/alarms").await;
+    assert_eq!(listed.as_array().unwrap().iter().filter(|one| one["injected"] == true).count(), 1);
+    assert_eq!(bench.delete(&path).await.json(), json!([]));
+    assert_eq!(bench.delete(&path).await.json(), json!([]), "it was let go already");
+}
+
+#[tokio::test]
 async fn values_are_what_clients_read() {
     let bench = Bench::new().await;
     let names = "state.engine,mode,breaker.mains.closed,genset.frequency,unit_mode";
