@@ -2,7 +2,7 @@
 //! other; which pages there are is not in the manual.
 
 use crate::bank::Bank;
-use crate::lcd::Canvas;
+use crate::lcd::{COLUMNS, Canvas};
 use crate::waveform::{Analysis, SAMPLES, order};
 
 use super::DatakomD;
@@ -91,7 +91,13 @@ impl Page<'_> {
 
     fn status(&mut self, unit: &DatakomD, shown: &Shown) {
         let status = self.label(unit, "operation_status", unit.sequence.operation() as u8);
-        self.canvas.text(1, 0, status);
+        // The longest take two lines.
+        let (first, rest) = match status.rsplit_once(' ') {
+            Some(halves) if status.len() > COLUMNS => halves,
+            _ => (status, ""),
+        };
+        self.canvas.text(1, 0, first);
+        self.canvas.text(2, 0, rest);
         if unit.seconds_left() > 0 {
             self.canvas.text_right(2, &format!("{} s", unit.seconds_left()));
         }
