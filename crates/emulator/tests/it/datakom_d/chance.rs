@@ -57,7 +57,8 @@ fn happen(site: &mut Site, event: &Event) {
 fn obeys(site: &Site) -> Result<(), TestCaseError> {
     let status = site.code("operation_status");
     prop_assert!(status <= 25);
-    let [shutdown, load_dump, warning] = [SHUTDOWN, LOAD_DUMP, WARNING].map(|array| !site.bits(array).is_empty());
+    let [shutdown, load_dump, warning] =
+        [SHUTDOWN, LOAD_DUMP, WARNING].map(|array| !site.bits(array).is_empty());
     let derived = [shutdown, load_dump, warning, shutdown || load_dump, shutdown || load_dump || warning];
     prop_assert_eq!([50, 51, 52, 53, 54].map(|flag| site.flag(flag)), derived);
     prop_assert_eq!(&site.codes("leds")[..3], &[shutdown, load_dump, warning].map(u8::from)[..]);
@@ -70,7 +71,8 @@ fn obeys(site: &Site) -> Result<(), TestCaseError> {
     prop_assert!(!site.flag(2) || site.flag(0), "never cranked without fuel");
 
     for source in ["mains", "genset"] {
-        let [p, q, s] = ["active", "reactive", "apparent"].map(|what| site.number(&format!("{source}_{what}_power")));
+        let [p, q, s] =
+            ["active", "reactive", "apparent"].map(|what| site.number(&format!("{source}_{what}_power")));
         prop_assert!((s - p.hypot(q)).abs() < 0.06, "{}: {} {} {}", source, p, q, s);
     }
     if site.number("pickup_speed") > 0.0 {
