@@ -67,6 +67,7 @@ function failed(error) {
     $('token').hidden = false
     $('site').hidden = true
   }
+  if (!isRefused || error.status === 404) controllers = []
   // What was not heard lately looks it.
   $('site').classList.toggle('lost', !isRefused)
   tell(isRefused ? error.message : 'No connection to the imitation. What is shown is as it was last heard.')
@@ -298,13 +299,15 @@ async function refresh() {
 }
 
 async function show() {
-  controllers = await ask('')
-  const wanted = decodeURIComponent(location.hash.slice(1))
-  const next = controllers.find(({ id }) => id === wanted) ?? controllers[0]
-  if (!next) return
-  if (next.id !== shown?.id) await begin(next.id)
-  const state = statePoint ? ask(`/${next.id}/values?name=${statePoint}`) : []
-  const [signals, more, pins] = await Promise.all([ask(`/${next.id}/values`), state, ask(`/${next.id}/pins`)])
+  // Which there are does not change while the imitation runs; another one may have taken its place.
+  if (controllers.length === 0) controllers = await ask('')
+  const chosen = controllers.find(({ id }) => location.hash === `#${id}`) ?? controllers[0]
+  if (!chosen) return
+  const { id } = chosen
+  if (id !== shown?.id) await begin(id)
+  const state = statePoint ? ask(`/${id}/values?name=${statePoint}`) : []
+  const asked = [ask(`/${id}`), ask(`/${id}/values`), state, ask(`/${id}/pins`)]
+  const [next, signals, more, pins] = await Promise.all(asked)
   shown = next
   document.title = `${shown.name} · Imitation`
   showControllers()

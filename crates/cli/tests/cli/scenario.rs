@@ -112,4 +112,17 @@ fn a_client_can_watch_while_it_plays() {
     let url = service.line();
     let read = busbar(&format!("read datakom-d --from {} unit_mode --json", url.trim())).ok().json();
     assert_eq!(read[0]["value"], "AUTO");
+    let (status, told) = service.signal("INT");
+    assert_eq!(status, Some(0), "Ctrl-C is no failed expectation");
+    assert!(told.ends_with("busbar: the scenario was stopped before its end\n"), "{told}");
+}
+
+#[test]
+fn the_call_has_the_last_word() {
+    let late = TEST.replace(
+        "controller = \"datakom-d\"",
+        "controller = \"datakom-d\"\nsettings = { preheat_time = 60 }",
+    );
+    play(&late, "").fails();
+    play(&late, "--set preheat_time=1").ok();
 }

@@ -294,6 +294,7 @@ impl Panel for DatakomD {
         }
         // The plant first: the status then tells of breakers that have moved, in the same image.
         self.plant.step(seconds, &self.controls);
+        self.sequence.failures.to_synchronize |= self.plant.is_jolting();
         self.look(dt);
         self.act(dt);
     }

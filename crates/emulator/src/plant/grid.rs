@@ -78,7 +78,7 @@ impl Grid {
     }
 
     /// Hz, seen or not.
-    pub(super) fn frequency(&self) -> f64 {
+    pub(super) fn hertz(&self) -> f64 {
         self.hertz
     }
 

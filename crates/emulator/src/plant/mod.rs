@@ -183,19 +183,6 @@ impl Plant {
         self.tank.step(dt, self.engine.burn, controls.fuel_pump);
     }
 
-    /// Whether the mains are good enough to feed the load.
-    pub(crate) fn mains_healthy(&self) -> bool {
-        self.mains.voltage.iter().all(|volts| (190.0..260.0).contains(volts))
-            && (47.0..53.0).contains(&self.mains.frequency)
-            && !self.mains.phase_order_wrong
-    }
-
-    /// Whether the genset is good enough to feed the load.
-    pub(crate) fn genset_healthy(&self) -> bool {
-        self.genset.voltage.iter().all(|volts| (200.0..260.0).contains(volts))
-            && (47.0..53.0).contains(&self.genset.frequency)
-    }
-
     /// Switches the line of the grid off, or on again, whatever the lever `mains` says.
     pub(crate) fn fail_mains(&mut self, failed: bool) {
         self.grid.outage = failed;
@@ -224,9 +211,9 @@ impl Plant {
         }
     }
 
-    /// Times since power-on that genset and grid were joined out of step.
-    pub(crate) fn jolts(&self) -> u32 {
-        self.coupling.jolts()
+    /// Whether genset and grid were joined out of step just now, and pull at each other.
+    pub(crate) fn is_jolting(&self) -> bool {
+        self.coupling.is_jolting()
     }
 
     /// What the senders tell.
@@ -260,7 +247,7 @@ impl Plant {
             ..Feed::default()
         };
         self.genset_energy.add(&self.genset, dt);
-        self.coupling.follow(dt, &self.genset, self.grid.frequency());
+        self.coupling.follow(dt, &self.genset, self.grid.hertz());
     }
 
     /// One busbar has one frequency and one voltage, and the grid is the stronger.

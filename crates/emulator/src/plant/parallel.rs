@@ -66,18 +66,12 @@ pub(super) struct Coupling {
     /// kW and kvar of the genset.
     active: f64,
     reactive: f64,
-    jolts: u32,
 }
 
 impl Coupling {
     /// Degrees by which the genset leads the mains.
     pub(super) fn angle(&self) -> f64 {
         self.angle
-    }
-
-    /// Times the two were joined out of step.
-    pub(super) fn jolts(&self) -> u32 {
-        self.jolts
     }
 
     /// Whether they pull at each other out of step.
@@ -91,10 +85,7 @@ impl Coupling {
         self.tie = match (joined, self.tie) {
             (false, _) => Tie::Apart,
             (true, Tie::Apart) if synchronism.is_safe() => Tie::Together,
-            (true, Tie::Apart) => {
-                self.jolts += 1;
-                Tie::Jolting(RELEASE)
-            }
+            (true, Tie::Apart) => Tie::Jolting(RELEASE),
             (true, Tie::Jolting(left)) if left > 1.5 * dt => Tie::Jolting(left - dt),
             (true, Tie::Jolting(_)) => {
                 releases = true;

@@ -24,7 +24,7 @@ pub(super) fn in_words(duration: Duration) -> String {
     match duration.as_millis() {
         0 => "0s".to_owned(),
         ms if ms % 3_600_000 == 0 => format!("{}h", ms / 3_600_000),
-        ms if ms % 60_000 == 0 => format!("{}min", ms / 60_000),
+        ms if ms % 60_000 == 0 && ms > 60_000 => format!("{}min", ms / 60_000),
         ms if ms % 1_000 == 0 => format!("{}s", ms / 1_000),
         ms => format!("{ms}ms"),
     }
@@ -68,7 +68,7 @@ mod tests {
         ] {
             assert_eq!(duration(text), milliseconds.map(Duration::from_millis), "{text}");
         }
-        for text in ["0s", "1500ms", "90s", "3min", "2h"] {
+        for text in ["0s", "1500ms", "60s", "90s", "3min", "2h"] {
             assert_eq!(in_words(duration(text).unwrap()), text);
         }
     }

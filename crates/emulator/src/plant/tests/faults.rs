@@ -16,7 +16,7 @@ fn the_grid_shows_what_is_wrong_with_it() {
     ] {
         pull(&mut plant, "mains", word);
         run(&mut plant, &on_mains(), 3.0);
-        assert_eq!(plant.mains_healthy(), healthy, "{word} {:?}", plant.mains);
+        assert_eq!(mains_healthy(&plant), healthy, "{word} {:?}", plant.mains);
         assert_eq!(plant.mains.phase_order_wrong, word == "reversed");
     }
     pull(&mut plant, "mains", "l2_lost");

@@ -2,12 +2,13 @@
 
 mod faults;
 mod life;
+mod page;
 mod parallel;
 mod properties;
 
 use crate::levers::{Lever, Position};
 
-use super::{Controls, LEVERS, Plant, Synchronism};
+use super::{Controls, Feed, LEVERS, Plant, Synchronism};
 
 const DT: f64 = 0.1;
 
@@ -38,6 +39,20 @@ fn run(plant: &mut Plant, controls: &Controls, seconds: f64) {
 fn pull(plant: &mut Plant, id: &str, to: &str) {
     let lever = LEVERS.iter().find(|lever| lever.id == id).unwrap();
     plant.pull(id, lever.position(to).unwrap());
+}
+
+/// Good enough to feed the load.
+fn mains_healthy(plant: &Plant) -> bool {
+    let mains = &plant.mains;
+    is_healthy(mains) && !mains.phase_order_wrong
+}
+
+fn genset_healthy(plant: &Plant) -> bool {
+    is_healthy(&plant.genset)
+}
+
+fn is_healthy(feed: &Feed) -> bool {
+    feed.voltage.iter().all(|volts| (200.0..260.0).contains(volts)) && (47.0..53.0).contains(&feed.frequency)
 }
 
 fn on_mains() -> Controls {
