@@ -4,6 +4,8 @@
 //! states and what it does where the manual is silent.
 
 mod alarms;
+#[cfg(test)]
+mod chaos;
 mod clock;
 mod ecu;
 mod exerciser;
@@ -306,6 +308,25 @@ impl DatakomDkg705 {
         }
     }
 
+    /// Judges what is wrong, and has the sequence act on it.
+    fn judge_alarms(&mut self, dt: Duration) {
+        let view = View {
+            measures: &self.measures,
+            set: &self.set,
+            sequence: &self.sequence,
+            regulation: &self.regulation,
+            protections: &self.protections,
+            ecu: &self.ecu,
+            site: self.contacts(),
+        };
+        self.alarms.step(dt, &view);
+        if self.alarms.shutdown() {
+            self.sequence.stop_now(&self.set);
+        } else if self.alarms.load_dump() {
+            self.sequence.dump_load(&self.set);
+        }
+    }
+
     /// Whether the mains need help: by what they carry before, and by what both carry after the genset has joined.
     fn judge_load(&mut self, dt: Duration) {
         let load = self.measures.mains.total_active() + self.measures.genset.total_active();
@@ -348,11 +369,9 @@ impl Panel for DatakomDkg705 {
         self.judge_mains(dt);
         self.judge_load(dt);
         self.exercise(dt);
-        if self.alarms.shutdown() {
-            self.sequence.stop_now(&self.set);
-        } else if self.alarms.load_dump() {
-            self.sequence.dump_load(&self.set);
-        }
+        self.ecu.step(dt, &self.plant, &self.sequence, self.set.options.ecu);
+        // Before anything is started: what was acknowledged and is still so keeps the genset where it is.
+        self.judge_alarms(dt);
         let (demand, sensed) = (self.demand(), self.sensed());
         self.sequence.step(dt, demand, sensed, &self.set);
         let task = Task {
@@ -361,23 +380,12 @@ impl Panel for DatakomDkg705 {
             mains_keep: self.set.peak.as_ref().filter(|_| demand.parallel).map(|peak| peak.mains),
         };
         self.regulation.step(dt, task, &self.measures, &mut self.plant, &self.set);
-        self.ecu.step(dt, &self.plant, &self.sequence, self.set.options.ecu);
         self.keep_ready(dt);
         self.controls = Controls {
             block_heater: self.block_heater,
             fuel_pump: self.fuel_pump,
             ..self.sequence.controls(demand, sensed, &self.set)
         };
-        let view = View {
-            measures: &self.measures,
-            set: &self.set,
-            sequence: &self.sequence,
-            regulation: &self.regulation,
-            protections: &self.protections,
-            ecu: &self.ecu,
-            site: self.contacts(),
-        };
-        self.alarms.step(dt, &view);
         self.clock.step(dt);
     }
 

@@ -8,6 +8,8 @@ use crate::plant::Feed;
 use super::operation::Operation;
 use super::{CLOCK, DatakomDkg705, MODE_KEYS, Mode, mains};
 
+/// kvar below which a register shows none.
+const LEAST_POWER: f64 = 0.005;
 /// The bit of a phase order that is wrong.
 const WRONG: u16 = 7;
 
@@ -74,7 +76,8 @@ fn feed(feed: &Feed, at: &FeedRegisters, bank: &mut Bank) {
     bank.number(at.reactive, feed.total_reactive());
     // The sign tells capacitive from inductive, and not the direction.
     let factor = feed.total_power_factor().abs();
-    bank.number(at.power_factor, if feed.total_reactive() < 0.0 { -factor } else { factor });
+    let capacitive = feed.total_reactive() < -LEAST_POWER;
+    bank.number(at.power_factor, if capacitive { -factor } else { factor });
 }
 
 fn engine(unit: &DatakomDkg705, bank: &mut Bank) {

@@ -27,6 +27,12 @@ const TRANSITIONS: &[(Operation, Operation, &str)] = &[
     (OffLoad, GensetContactor, "load wanted, mains dead or not connected"),
     (OffLoad, MainsContactor, "good mains are not connected"),
     (OffLoad, Cooldown, "no longer wanted"),
+    (Cooldown, OffLoad, "engine wanted again"),
+    (Cooldown, SynchronizeToGenset, "load wanted again, mains live"),
+    (Cooldown, GensetContactor, "load wanted again, mains dead or not connected"),
+    (Cooldown, MainsContactor, "good mains are not connected"),
+    (Cooldown, Stopping, "timer over, fuel closes"),
+    (Stopping, AtRest, "timer over, engine stands"),
     (SynchronizeToGenset, GensetContactorSynch, "in step"),
     (SynchronizeToGenset, GensetContactor, "mains fail, or synchronization fail"),
     (SynchronizeToGenset, OffLoad, "load no longer wanted, or synchronization fail in peak lopping"),
@@ -64,17 +70,7 @@ const TRANSITIONS: &[(Operation, Operation, &str)] = &[
     (MainsContactor, AtRest, "closed or mains fail, engine stands"),
     (MainsContactor, OffLoad, "closed, mains fail or load wanted, engine wanted"),
     (MainsContactor, Cooldown, "closed or mains fail, engine no longer wanted"),
-    (Cooldown, OffLoad, "engine wanted again"),
-    (Cooldown, SynchronizeToGenset, "load wanted again, mains live"),
-    (Cooldown, GensetContactor, "load wanted again, mains dead or not connected"),
-    (Cooldown, MainsContactor, "good mains are not connected"),
-    (Cooldown, Stopping, "timer over, fuel closes"),
-    (Stopping, AtRest, "timer over, engine stands"),
 ];
-
-/// Those that a shutdown stops at once, and those that a load dump sends to cool down.
-const FUELLED: &str = "Fuelled";
-const LOADED: &str = "Loaded";
 
 const ALL: [Operation; 17] = [
     AtRest,
@@ -231,49 +227,57 @@ fn page() -> String {
     std::fs::read_to_string(path).unwrap()
 }
 
-/// The lines of its state diagram.
-fn diagram(page: &str) -> Vec<&str> {
-    let (_, rest) = page.split_once("```mermaid\n").unwrap();
-    rest.split_once("```").unwrap().0.lines().map(str::trim).collect()
+/// The lines of its state diagrams.
+fn diagrams(page: &str) -> impl Iterator<Item = &str> {
+    page.split("```mermaid\n")
+        .skip(1)
+        .flat_map(|rest| rest.split("```").take(1))
+        .flat_map(str::lines)
+        .map(str::trim)
 }
 
 #[test]
 fn the_documentation_draws_the_table() {
     let page = page();
-    let drawn: Vec<_> = diagram(&page).into_iter().filter(|line| line.contains("-->")).collect();
+    let drawn: Vec<_> = diagrams(&page).filter(|line| line.contains("-->")).collect();
     let steps = TRANSITIONS.iter().map(|(from, to, cause)| format!("{from:?} --> {to:?}: {cause}"));
-    let table: Vec<_> = std::iter::once("[*] --> AtRest".to_owned())
-        .chain(steps)
-        .chain([
-            format!("{FUELLED} --> Stopping: shutdown, or OFF twice"),
-            format!("{LOADED} --> Cooldown: load dump"),
-        ])
-        .collect();
+    let table: Vec<_> = std::iter::once("[*] --> AtRest".to_owned()).chain(steps).collect();
     assert_eq!(drawn, table);
 }
 
 #[test]
-fn the_documentation_puts_every_operation_where_it_belongs_with_its_code() {
+fn the_documentation_names_every_operation_by_its_code() {
     let page = page();
-    let mut inside: Vec<&str> = Vec::new();
-    let mut drawn = BTreeSet::new();
-    for line in diagram(&page) {
-        if let Some(composite) = line.strip_prefix("state ").and_then(|rest| rest.strip_suffix(" {")) {
-            inside.push(composite);
-        } else if line == "}" {
-            inside.pop();
-        } else if let Some((label, name)) =
-            line.strip_prefix("state \"").and_then(|rest| rest.split_once("\" as "))
-        {
-            let code: u16 = label.split(' ').next().unwrap().parse().unwrap();
-            drawn.insert((name.to_owned(), code, inside.contains(&FUELLED), inside.contains(&LOADED)));
-        }
-    }
+    let drawn: BTreeSet<_> = diagrams(&page)
+        .filter_map(|line| line.strip_prefix("state \"")?.split_once("\" as "))
+        .map(|(label, name)| (name.to_owned(), label.split(' ').next().unwrap().parse().unwrap()))
+        .collect();
+    let codes = ALL.iter().map(|operation| (format!("{operation:?}"), operation.code())).collect();
+    assert_eq!(drawn, codes);
+}
+
+#[test]
+fn the_documentation_says_whom_a_shutdown_and_a_load_dump_reach() {
+    let page = page();
+    let rows: BTreeSet<_> = page
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `"))
+        .filter_map(|row| {
+            let cells: Vec<_> = row.split('|').map(|cell| cell.trim().trim_end_matches('`')).collect();
+            let [name, code, shutdown, load_dump, ""] = cells[..] else { return None };
+            Some((name.to_owned(), code.parse::<u16>().ok()?, shutdown.to_owned(), load_dump.to_owned()))
+        })
+        .collect();
     let expected = ALL.iter().map(|operation| {
-        let fuelled = fuels(*operation).contains(&true);
-        (format!("{operation:?}"), operation.code(), fuelled, operation.is_loaded())
+        let shutdown = match fuels(*operation) {
+            [true] => "13",
+            [false] => "-",
+            _ => "13 if the engine runs",
+        };
+        let load_dump = if operation.is_loaded() { "12" } else { "-" };
+        (format!("{operation:?}"), operation.code(), shutdown.to_owned(), load_dump.to_owned())
     });
-    assert_eq!(drawn, expected.collect());
+    assert_eq!(rows, expected.collect());
 }
 
 #[test]

@@ -177,7 +177,13 @@ const CAUSES: &[Cause] = &[
     cause("warning_alarms_3.genset_high_rpm", &[("high_rpm_warning", "1400")], WARMING, &[], 30),
     cause("warning_alarms_3.parallel_mains_failure", SLOW, MOVING, &[("mains", "failed")], 3),
     cause("warning_alarms_3.parallel_mains_reverse_power", &[], LOADED, &[], 0),
-    cause("warning_alarms_3.parallel_mains_frequency_fail", SLOW, MOVING, &[("mains.frequency", "54")], 30),
+    cause(
+        "warning_alarms_3.parallel_mains_frequency_fail",
+        &[("soft_transfer_ramp", "0.5"), ("mains_frequency_high", "50.3")],
+        MOVING,
+        &[("mains.frequency", "50.6")],
+        5,
+    ),
     cause(
         "warning_alarms_3.parallel_no_mains_frequency",
         // Else the jump and the voltage part them before the frequency is seen to be gone.
@@ -386,7 +392,7 @@ fn a_shutdown_on_load_stops_at_once_and_a_load_dump_cools_down_first() {
         site.walk_to(8);
         site.pass_seconds(5);
         site.device.inject(alarm, true).unwrap();
-        let mut seen = Vec::new();
+        let mut seen = vec![8];
         for _ in 0..900 {
             site.pass(TENTH);
             seen.push(site.code("operation_status"));
