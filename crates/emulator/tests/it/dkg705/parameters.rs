@@ -33,10 +33,6 @@ fn status(code: u32) -> impl Fn(&Site) -> bool {
     move |site| site.code("operation_status") == code
 }
 
-fn relay(bit: u16) -> impl Fn(&Site) -> bool {
-    move |site| site.bits("relays").contains(bit)
-}
-
 #[test]
 fn a_parameter_is_shown_at_once_and_as_its_register_holds_it() {
     let mut site = quiet();
@@ -103,26 +99,42 @@ fn the_words_at_1000h_show_their_bits() {
     }
 }
 
+/// What lasts as long as a timer.
+enum Span {
+    Status(u32),
+    Relay(u16),
+    Idle,
+}
+
+impl Span {
+    fn is_now(&self, site: &Site) -> bool {
+        match self {
+            Self::Status(code) => site.code("operation_status") == *code,
+            Self::Relay(bit) => site.bits("relays").contains(*bit),
+            Self::Idle => site.bits("relay_functions_2").contains(1),
+        }
+    }
+}
+
+const STARTER: u16 = 2;
+
 #[test]
 fn every_timer_of_a_run_is_as_long_as_it_is_set() {
-    type So = Box<dyn Fn(&Site) -> bool>;
-    let idle: So = Box::new(|site| site.bits("relay_functions_2").contains(1));
-    let cases: [(&[(&str, &str)], u16, So, u32); 11] = [
-        (&[("wait_before_fuel_timer", "7"), ("preheat_timer", "0")], TEST, Box::new(status(1)), 70),
-        (&[("wait_before_fuel_timer", "2"), ("preheat_timer", "5")], TEST, Box::new(status(1)), 70),
-        (&[("preheat_timer", "5")], TEST, Box::new(relay(1)), 50),
-        (&[("crank_timer", "3")], TEST, Box::new(relay(2)), 30),
-        (&[("crank_timer", "9")], TEST, Box::new(relay(2)), 90),
-        (&[("engine_heating_timer", "15")], TEST, Box::new(status(4)), 150),
-        (&[("engine_heating_timer", "0"), ("idle_timer", "6")], TEST, Box::new(status(4)), 60),
-        (&[("idle_timer", "6")], TEST, idle, 60),
-        (&[("genset_contactor_timer", "6")], LOAD_TEST, Box::new(status(6)), 60),
-        (&[("cooldown_timer", "10")], OFF, Box::new(status(12)), 100),
-        (&[("stop_timer", "20")], OFF, Box::new(status(13)), 200),
-    ];
-    for (settings, key, so, tenths) in cases {
+    for (settings, key, span, seconds) in [
+        (&[("wait_before_fuel_timer", "7"), ("preheat_timer", "0")][..], TEST, Span::Status(1), 7),
+        (&[("wait_before_fuel_timer", "2"), ("preheat_timer", "5")], TEST, Span::Status(1), 7),
+        (&[("preheat_timer", "5")], TEST, Span::Relay(1), 5),
+        (&[("crank_timer", "3")], TEST, Span::Relay(STARTER), 3),
+        (&[("crank_timer", "9")], TEST, Span::Relay(STARTER), 9),
+        (&[("engine_heating_timer", "15")], TEST, Span::Status(4), 15),
+        (&[("engine_heating_timer", "0"), ("idle_timer", "6")], TEST, Span::Status(4), 6),
+        (&[("idle_timer", "6")], TEST, Span::Idle, 6),
+        (&[("genset_contactor_timer", "6")], LOAD_TEST, Span::Status(6), 6),
+        (&[("cooldown_timer", "10")], OFF, Span::Status(12), 10),
+        (&[("stop_timer", "20")], OFF, Span::Status(13), 20),
+    ] {
         let mut site = set(settings);
-        if tenths == 30 || tenths == 90 {
+        if matches!(span, Span::Relay(STARTER)) {
             site.device.pull("ignition", "never").unwrap();
         }
         if key == OFF {
@@ -130,8 +142,8 @@ fn every_timer_of_a_run_is_as_long_as_it_is_set() {
             site.walk_to(4);
         }
         site.write(MODE_KEYS, key);
-        let lasted = lasts(&mut site, so);
-        assert!((tenths..=tenths + 4).contains(&lasted), "{settings:?}: {lasted} tenths");
+        let lasted = lasts(&mut site, |site| span.is_now(site));
+        assert!((10 * seconds..=10 * seconds + 4).contains(&lasted), "{settings:?}: {lasted} tenths");
     }
 }
 
