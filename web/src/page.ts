@@ -13,5 +13,4 @@ export function start(early: Early, signals: readonly string[]): void {
   page.start()
   const target = document.getElementById('page')
   if (target) mount(App, { target, props: { page } })
-  document.querySelector('link[rel=icon]')?.setAttribute('href', './favicon.svg')
 }
