@@ -15,6 +15,17 @@ pub(super) const DEAD_PHASE: f64 = 50.0;
 /// Hz a second at which the grid drifts to another frequency.
 const DRIFT: f64 = 0.5;
 
+/// What switchgear farther up gives, as parts of its rated voltage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Supply {
+    /// Of each phase.
+    pub(crate) parts: [f64; 3],
+    /// Hz; 0 where nothing is there.
+    pub(crate) frequency: f64,
+    /// Two phases have changed places.
+    pub(crate) reversed: bool,
+}
+
 /// What is wrong with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Condition {
@@ -38,6 +49,8 @@ pub(super) struct Grid {
     pub(super) held_frequency: Option<f64>,
     /// The line is switched off, whatever its condition.
     pub(super) outage: bool,
+    /// What feeds the line; none where that is always there.
+    pub(super) supply: Option<Supply>,
     level: f64,
     /// Hz that it has, and Hz with its wandering.
     frequency: f64,
@@ -57,6 +70,7 @@ impl Grid {
             held_voltage: None,
             held_frequency: None,
             outage: false,
+            supply: None,
             level: NOMINAL_VOLTAGE,
             frequency: NOMINAL_FREQUENCY,
             hertz: NOMINAL_FREQUENCY,
@@ -70,11 +84,15 @@ impl Grid {
 
     /// Whether it can feed anybody.
     pub(super) fn is_alive(&self) -> bool {
-        !self.outage && self.condition != Condition::Failed && self.level > DEAD_PHASE
+        let supplied = self
+            .supply
+            .is_none_or(|supply| supply.parts.iter().sum::<f64>() / 3.0 * NOMINAL_VOLTAGE > DEAD_PHASE);
+        supplied && !self.outage && self.condition != Condition::Failed && self.level > DEAD_PHASE
     }
 
     pub(super) fn is_reversed(&self) -> bool {
-        self.condition == Condition::Reversed
+        let reversed = self.supply.is_some_and(|supply| supply.reversed);
+        reversed != (self.condition == Condition::Reversed)
     }
 
     /// Hz, seen or not.
@@ -91,7 +109,10 @@ impl Grid {
         }
         let drift = self.held_frequency.unwrap_or(NOMINAL_FREQUENCY) - self.frequency;
         self.frequency += drift.clamp(-DRIFT * dt, DRIFT * dt);
-        self.hertz = self.frequency + self.wander.step(dt, random);
+        let own = self.frequency + self.wander.step(dt, random);
+        // What somebody holds is held, wherever it comes from.
+        let from_above = self.supply.filter(|supply| supply.frequency > 0.0 && self.held_frequency.is_none());
+        self.hertz = from_above.map_or(own, |supply| supply.frequency);
 
         let remains = self.remains(dt, random);
         let mut voltage = [0.0; 3];
@@ -112,6 +133,13 @@ impl Grid {
 
     /// Part of its voltage that each phase is to have.
     fn remains(&mut self, dt: f64, random: &mut Random) -> [f64; 3] {
+        let supplied = self.supply.map_or([1.0; 3], |supply| supply.parts);
+        let own = self.own_remains(dt, random);
+        std::array::from_fn(|phase| own[phase] * supplied[phase])
+    }
+
+    /// The same, of the line itself.
+    fn own_remains(&mut self, dt: f64, random: &mut Random) -> [f64; 3] {
         if self.outage {
             return [0.0; 3];
         }
@@ -181,6 +209,23 @@ mod tests {
         }
         assert_eq!(run(&mut grid(Condition::Failed), 3.0), ([0.0; 3], 0.0));
         assert!(grid(Condition::Reversed).is_reversed());
+    }
+
+    #[test]
+    fn what_feeds_it_is_what_it_has() {
+        let supply = |parts, frequency| Some(Supply { parts, frequency, reversed: false });
+        let mut grid = grid(Condition::Normal);
+        grid.supply = supply([1.0, 0.7, 0.0], 49.7);
+        let (volts, hertz) = run(&mut grid, 3.0);
+        assert!(volts[0] > 225.0 && (155.0..170.0).contains(&volts[1]) && volts[2] == 0.0, "{volts:?}");
+        assert!(hertz == 49.7 && grid.is_alive());
+        grid.supply = supply([0.0; 3], 0.0);
+        assert_eq!(run(&mut grid, 3.0), ([0.0; 3], 0.0));
+        assert!(!grid.is_alive());
+        grid.supply = Some(Supply { parts: [1.0; 3], frequency: 50.0, reversed: true });
+        assert!(run(&mut grid, 3.0).0[0] > 225.0 && grid.is_alive() && grid.is_reversed());
+        grid.condition = Condition::Reversed;
+        assert!(!grid.is_reversed(), "twice is not at all");
     }
 
     #[test]
