@@ -54,7 +54,7 @@ fn read(root: &DeTable<'_>, notes: &mut Notes<'_>) -> Option<Fleet> {
     // In this order, for each names what those before it are.
     for key in &FILE[1..] {
         let found = all.iter().find(|entry| entry.key == *key);
-        for (table, span) in found.map(|entry| tables(entry, notes)).unwrap_or_default() {
+        for (table, span) in found.map(|entry| notes.tables(entry)).unwrap_or_default() {
             match *key {
                 "wires" => draft.wire(table, span, notes),
                 "controllers" => draft.controller(table, span, notes),
@@ -90,24 +90,6 @@ fn head(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<String> {
         notes.missing(entry.span.clone(), "[fleet]", "title", "\"Two gensets\"");
     }
     title
-}
-
-type Table<'t, 'i> = (&'t DeTable<'i>, Range<usize>);
-
-/// The tables of a list of tables.
-fn tables<'t, 'i>(entry: &Entry<'t, 'i>, notes: &mut Notes<'_>) -> Vec<Table<'t, 'i>> {
-    let items = entry.value.get_ref().as_array();
-    let tables: Option<Vec<_>> = items.map(|items| {
-        items.iter().filter_map(|item| Some((item.get_ref().as_table()?, item.span()))).collect()
-    });
-    match tables.filter(|tables| Some(tables.len()) == items.map(|items| items.len())) {
-        Some(tables) => tables,
-        None => {
-            let wanted = format!("a list of tables, each headed [[{}]]", entry.key);
-            notes.wrong_type::<()>(entry, &wanted);
-            Vec::new()
-        }
-    }
 }
 
 impl Draft {

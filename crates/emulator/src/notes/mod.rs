@@ -243,6 +243,18 @@ impl<'a> Notes<'a> {
         }
     }
 
+    /// The tables of a list of tables, each with its place.
+    pub(crate) fn tables<'t, 'i>(&mut self, entry: &Entry<'t, 'i>) -> Vec<(&'t DeTable<'i>, Range<usize>)> {
+        let items = entry.value.get_ref().as_array();
+        let tables: Option<Vec<_>> = items.and_then(|items| {
+            items.iter().map(|item| Some((item.get_ref().as_table()?, item.span()))).collect()
+        });
+        tables.unwrap_or_else(|| {
+            self.wrong_type::<()>(entry, &format!("a list of tables, each headed [[{}]]", entry.key));
+            Vec::new()
+        })
+    }
+
     pub(crate) fn wrong_type<T>(&mut self, entry: &Entry<'_, '_>, wanted: &str) -> Option<T> {
         let found = entry.value.get_ref().type_str();
         let message = format!("`{}` has the wrong type ({found})", shown(&entry.key));
