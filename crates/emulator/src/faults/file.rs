@@ -198,6 +198,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_page_about_it_has_every_kind_and_key() {
+        const PAGE: &str = include_str!("../../../../docs/faults.md");
+        assert!(KINDS.iter().all(|kind| PAGE.contains(&format!("\n| `{kind}` |"))));
+        assert!(
+            FAULT
+                .iter()
+                .all(|key| PAGE.contains(&format!("`{key}`")) || PAGE.contains(&format!("\n{key} = ")))
+        );
+    }
+
+    #[test]
     fn a_file_is_a_list_of_what_goes_wrong() {
         let text = "seed = 3\n[[faults]]\nkind = \"late\"\nby = \"2s\"\nchance = 0.5\n\
                     [[faults]]\nkind = \"exception\"\ncode = 6\nevery = 10\naddress = 0x2000\n";
