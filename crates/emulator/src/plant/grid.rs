@@ -8,10 +8,14 @@ const NOMINAL_FREQUENCY: f64 = 50.0;
 /// Part of its voltage that a sag leaves, and that a swell makes of it: beyond every usual limit.
 const SAG: f64 = 0.72;
 const SWELL: f64 = 1.18;
-/// Below this part a meter sees neither voltage nor frequency.
+/// Below this part of its voltage a phase is as good as dead.
 const UNSEEN: f64 = 0.02;
+/// V below which a meter finds no frequency.
+const NO_FREQUENCY: f64 = 15.0;
 /// V below which a phase feeds nobody.
 pub(super) const DEAD_PHASE: f64 = 50.0;
+/// V from which all phases are beyond that, however they wander.
+const ALIVE: f64 = 53.0;
 /// Hz a second at which the grid drifts to another frequency.
 const DRIFT: f64 = 0.5;
 
@@ -70,7 +74,13 @@ impl Grid {
 
     /// Whether it can feed anybody.
     pub(super) fn is_alive(&self) -> bool {
-        !self.outage && self.condition != Condition::Failed && self.level > DEAD_PHASE
+        let part = match self.condition {
+            Condition::Failed => 0.0,
+            Condition::Sagging => SAG,
+            Condition::Flickering => self.flicker.part,
+            _ => 1.0,
+        };
+        !self.outage && part * self.level > ALIVE
     }
 
     pub(super) fn is_reversed(&self) -> bool {
@@ -106,8 +116,7 @@ impl Grid {
             }
             .max(0.0);
         }
-        let seen = voltage.iter().any(|volts| *volts > UNSEEN * NOMINAL_VOLTAGE);
-        (voltage, if seen { self.hertz } else { 0.0 })
+        (voltage, found(voltage, self.hertz))
     }
 
     /// Part of its voltage that each phase is to have.
@@ -124,6 +133,11 @@ impl Grid {
             Condition::Flickering => [self.flicker.step(dt, random); 3],
         }
     }
+}
+
+/// The frequency that a meter finds at these voltages.
+pub(super) fn found(voltage: [f64; 3], hertz: f64) -> f64 {
+    if voltage.iter().any(|volts| *volts > NO_FREQUENCY) { hertz } else { 0.0 }
 }
 
 /// Dips that come and go.
