@@ -93,11 +93,11 @@ pub(crate) struct Run {
 #[derive(Debug, clap::Args)]
 pub(crate) struct Emulate {
     /// The profile to imitate
-    #[arg(value_name = "KEY")]
-    pub(crate) key: String,
+    #[arg(value_name = "KEY", required_unless_present = "fleet")]
+    pub(crate) key: Option<String>,
     /// Where to answer: tcp://127.0.0.1:1502 or rtu+tcp:// (port 0 takes a free one), rtu:///dev/ttyUSB0, or rtu://pty
     /// for a new pseudo-terminal; may be repeated
-    #[arg(long, value_name = "URL", required = true, value_parser = endpoint)]
+    #[arg(long, value_name = "URL", required_unless_present = "fleet", value_parser = endpoint)]
     pub(crate) listen: Vec<Endpoint>,
     /// Further URLs after the first, as if --listen stood before each.
     #[arg(value_name = "URL", hide = true, requires = "listen", value_parser = endpoint)]
@@ -124,6 +124,9 @@ pub(crate) struct Emulate {
     /// Play a scenario and end with it: 0 when all that it expects came, 1 when not, 2 when the file is wrong
     #[arg(long, value_name = "FILE")]
     pub(crate) scenario: Option<PathBuf>,
+    /// Several controllers with their wires, and what joins their plants, in place of KEY and --listen
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["key", "listen", "unit", "model", "set", "scenario"])]
+    pub(crate) fleet: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]

@@ -14,6 +14,7 @@ use crate::inject::{self, Alarm, InjectError};
 use crate::levers::{Lever, LeverError, Position};
 use crate::panel::Panel;
 use crate::pins;
+use crate::plant::{Plant, Supply};
 use crate::random::Random;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
 use crate::scenario::{Player, Report};
@@ -99,19 +100,44 @@ impl Device {
     /// Lets the plant live until `now`, simulated time since power-on, and refreshes the registers.
     pub fn advance(&mut self, now: Duration) {
         let mut moved = false;
-        while self.clock + STEP <= now {
-            self.panel.step(STEP);
-            self.clock += STEP;
+        while self.is_due(now) {
+            self.step();
             moved = true;
-            if self.report().is_some_and(|report| !report.is_over()) {
-                self.panel.render(&mut self.bank);
-                self.play();
-            }
         }
         if moved {
-            self.panel.render(&mut self.bank);
-            self.stir();
+            self.settle();
         }
+    }
+
+    /// Whether a step of its plant ends by then.
+    pub(crate) fn is_due(&self, now: Duration) -> bool {
+        self.clock + STEP <= now
+    }
+
+    /// Lets its plant move by one step; [`settle`](Self::settle) shows what came of it.
+    pub(crate) fn step(&mut self) {
+        self.panel.step(STEP);
+        self.clock += STEP;
+        if self.report().is_some_and(|report| !report.is_over()) {
+            self.panel.render(&mut self.bank);
+            self.play();
+        }
+    }
+
+    /// Refreshes the registers after one or more steps.
+    pub(crate) fn settle(&mut self) {
+        self.panel.render(&mut self.bank);
+        self.stir();
+    }
+
+    /// The plant of a genset, for what it is joined to.
+    pub(crate) fn genset(&mut self) -> Option<&mut Plant> {
+        self.panel.genset()
+    }
+
+    /// What a bus section of its switchgear gives to whatever hangs on it; sections count from 0.
+    pub(crate) fn section(&self, section: usize) -> Option<Supply> {
+        self.panel.section(section)
     }
 
     /// Whether a request has a function that the device knows and a body that does not fit it: the manuals have no

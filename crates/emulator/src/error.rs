@@ -5,11 +5,12 @@ use std::io;
 use busbar_link::{Endpoint, SerialError};
 use busbar_profile::{Number, SerialSettings};
 
+use crate::levers::LeverError;
 use crate::server::SpeedError;
 use crate::settings::SettingError;
 
 /// An imitation was not started; nothing is left running.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StartError {
     /// The caller named a profile that does not exist.
@@ -53,6 +54,9 @@ pub enum StartError {
     /// The controller was to be set to something that it cannot be set to.
     #[error(transparent)]
     Setting(#[from] SettingError),
+    /// A lever was to stand where it cannot.
+    #[error(transparent)]
+    Lever(#[from] LeverError),
     /// The scenario happens to another controller.
     #[error(
         "the scenario \"{title}\" is for {controller}, not for {key}; imitate {controller}, or choose another one"

@@ -16,9 +16,11 @@ mod datakom_dkg705;
 mod device;
 mod error;
 mod facts;
+mod fleet;
 mod inject;
 mod lcd;
 mod levers;
+mod notes;
 mod panel;
 mod pins;
 mod plant;
@@ -35,10 +37,11 @@ pub use config::Config;
 pub use device::{Device, STEP};
 pub use error::{PinError, PinProblem, StartError};
 pub use facts::{Fact, FactError, FactKind, Subject};
+pub use fleet::{Fleet, Joint, Member};
 pub use inject::{Alarm, InjectError};
 pub use levers::{Lever, LeverError, Numbers, Position, Word};
 pub use scenario::{Check, CheckVerdict, Event, EventKind, Report, Scenario, Seen};
-pub use server::{Controller, Emulation, Pace, SpeedError, Statistics, start, start_together};
+pub use server::{Controller, Emulation, Pace, SpeedError, Statistics, start, start_fleet, start_together};
 pub use settings::SettingError;
 
 /// The fastest simulated clock: an hour a second.

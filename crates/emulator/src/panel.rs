@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use crate::bank::Bank;
 use crate::levers::{Lever, Position};
+use crate::plant::{Plant, Supply};
 use crate::rules::Refusals;
 use crate::settings::Settings;
 
@@ -46,6 +47,16 @@ pub(crate) trait Panel: Debug + Send {
 
     /// Pulls one of its levers to a position that it has.
     fn pull(&mut self, _id: &str, _to: Position) {}
+
+    /// The plant of a genset, for what it is joined to.
+    fn genset(&mut self) -> Option<&mut Plant> {
+        None
+    }
+
+    /// What a bus section of its switchgear gives to whatever hangs on it; sections count from 0.
+    fn section(&self, _section: usize) -> Option<Supply> {
+        None
+    }
 
     /// Takes an alarm for active, whatever the plant says, or no longer. False where that alarm follows from others.
     fn inject(&mut self, _point: &str, _bit: u16, _active: bool) -> bool {

@@ -3,7 +3,7 @@
 use std::{env, net::SocketAddr};
 
 use busbar_emulator::{
-    Emulation,
+    Emulation, Fleet,
     control::{self, Control, Imitated, ServeError, Server, Token},
 };
 
@@ -22,12 +22,19 @@ pub(super) fn token() -> Result<Option<Token>, Failure> {
     }
 }
 
-/// The control of what `busbar emulate` imitates.
-pub(super) async fn serve(
-    address: SocketAddr,
-    emulation: &Emulation,
-    token: Option<Token>,
-) -> Result<Server, Failure> {
+/// The controllers of a fleet that runs.
+pub(super) fn imitated(fleet: &Fleet, emulation: &Emulation) -> Vec<Imitated> {
+    let members = fleet.members.iter().zip(emulation.controllers());
+    let imitated = members.map(|(member, controller)| Imitated {
+        id: member.id.clone(),
+        name: member.name.clone(),
+        controller: controller.clone(),
+    });
+    imitated.collect()
+}
+
+/// Controllers that nobody has named.
+pub(super) fn alone(emulation: &Emulation) -> Vec<Imitated> {
     let imitated = emulation.controllers().iter().map(|controller| {
         let (id, name) = controller.with(|device| {
             let profile = device.profile();
@@ -35,7 +42,16 @@ pub(super) async fn serve(
         });
         Imitated { id, name, controller: controller.clone() }
     });
-    let control = Control { imitated: imitated.collect(), token, site: None };
+    imitated.collect()
+}
+
+/// The control of what `busbar emulate` imitates.
+pub(super) async fn serve(
+    address: SocketAddr,
+    imitated: Vec<Imitated>,
+    token: Option<Token>,
+) -> Result<Server, Failure> {
+    let control = Control { imitated, token, site: None };
     control::serve(address, control).await.map_err(|error| match error {
         ServeError::NoToken { .. } => Failure::Call(format!("{error} in {TOKEN}")),
         _ => Failure::Failed(format!("{error} (--control ADDR:PORT)")),

@@ -348,6 +348,10 @@ impl Panel for DatakomD {
         self.plant.pull(id, to);
     }
 
+    fn genset(&mut self) -> Option<&mut Plant> {
+        Some(&mut self.plant)
+    }
+
     fn inject(&mut self, point: &str, bit: u16, active: bool) -> bool {
         let class = match point {
             "shutdown_alarms" => Class::Shutdown,

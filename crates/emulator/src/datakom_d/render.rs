@@ -260,14 +260,14 @@ fn load_share(unit: &DatakomD, bank: &mut Bank) {
     let (own_active, own_reactive) = (genset.total_active(), genset.total_reactive());
     let (active, reactive) = (own_active + sisters.active(), own_reactive + sisters.reactive());
     let apparent = active.hypot(reactive);
-    let sets = 1.0 + sisters.on_bus() as f64;
+    let sets = sisters.sets();
     bank.number(11175, active);
     bank.number(11177, reactive);
     bank.number(11374, 100.0 * active / (sets * RATED_KW));
     bank.number(11375, 100.0 * reactive / (sets * RATED_KVAR));
     bank.number(11376, if apparent > 0.0 { active / apparent } else { 0.0 });
     bank.number(11377, sisters.behind(own_active));
-    bank.number(11378, 100.0 * (reactive / sets - own_reactive) / RATED_KVAR);
+    bank.number(11378, 100.0 * sisters.short(own_reactive, sisters.reactive()) / RATED_KVAR);
 }
 
 /// Whose hours or days are used up, and those that somebody has injected.

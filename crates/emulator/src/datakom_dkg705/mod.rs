@@ -433,6 +433,10 @@ impl Panel for DatakomDkg705 {
         self.plant.pull(id, to);
     }
 
+    fn genset(&mut self) -> Option<&mut Plant> {
+        Some(&mut self.plant)
+    }
+
     fn inject(&mut self, point: &str, bit: u16, active: bool) -> bool {
         // The ECU's warning is the ECU's: it gets a fault to report.
         if (point, bit) == ("warning_alarms_1", alarms::ECU_WARNING) {

@@ -19,6 +19,17 @@ const ALIVE: f64 = 53.0;
 /// Hz a second at which the grid drifts to another frequency.
 const DRIFT: f64 = 0.5;
 
+/// What switchgear farther up gives, as parts of its rated voltage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Supply {
+    /// Of each phase.
+    pub(crate) parts: [f64; 3],
+    /// Hz; 0 where nothing is there.
+    pub(crate) frequency: f64,
+    /// Two phases have changed places.
+    pub(crate) reversed: bool,
+}
+
 /// What is wrong with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Condition {
@@ -42,6 +53,8 @@ pub(super) struct Grid {
     pub(super) held_frequency: Option<f64>,
     /// The line is switched off, whatever its condition.
     pub(super) outage: bool,
+    /// What feeds the line; none where that is always there.
+    pub(super) supply: Option<Supply>,
     level: f64,
     /// Hz that it has, and Hz with its wandering.
     frequency: f64,
@@ -61,6 +74,7 @@ impl Grid {
             held_voltage: None,
             held_frequency: None,
             outage: false,
+            supply: None,
             level: NOMINAL_VOLTAGE,
             frequency: NOMINAL_FREQUENCY,
             hertz: NOMINAL_FREQUENCY,
@@ -74,17 +88,12 @@ impl Grid {
 
     /// Whether it can feed anybody.
     pub(super) fn is_alive(&self) -> bool {
-        let part = match self.condition {
-            Condition::Failed => 0.0,
-            Condition::Sagging => SAG,
-            Condition::Flickering => self.flicker.part,
-            _ => 1.0,
-        };
-        !self.outage && part * self.level > ALIVE
+        !self.outage && self.parts().iter().any(|part| part * self.level > ALIVE)
     }
 
     pub(super) fn is_reversed(&self) -> bool {
-        self.condition == Condition::Reversed
+        let reversed = self.supply.is_some_and(|supply| supply.reversed);
+        reversed != (self.condition == Condition::Reversed)
     }
 
     /// Hz, seen or not.
@@ -101,7 +110,10 @@ impl Grid {
         }
         let drift = self.held_frequency.unwrap_or(NOMINAL_FREQUENCY) - self.frequency;
         self.frequency += drift.clamp(-DRIFT * dt, DRIFT * dt);
-        self.hertz = self.frequency + self.wander.step(dt, random);
+        let own = self.frequency + self.wander.step(dt, random);
+        // What somebody holds is held, wherever it comes from.
+        let from_above = self.supply.filter(|supply| supply.frequency > 0.0 && self.held_frequency.is_none());
+        self.hertz = from_above.map_or(own, |supply| supply.frequency);
 
         let remains = self.remains(dt, random);
         let mut voltage = [0.0; 3];
@@ -124,14 +136,24 @@ impl Grid {
         if self.outage {
             return [0.0; 3];
         }
-        match self.condition {
-            Condition::Normal | Condition::Reversed => [1.0; 3],
-            Condition::Failed => [0.0; 3],
-            Condition::Sagging => [SAG; 3],
-            Condition::Swelling => [SWELL; 3],
-            Condition::Lost(lost) => std::array::from_fn(|phase| if phase == lost { 0.0 } else { 1.0 }),
-            Condition::Flickering => [self.flicker.step(dt, random); 3],
+        if self.condition == Condition::Flickering {
+            self.flicker.step(dt, random);
         }
+        self.parts()
+    }
+
+    /// What the line's condition and what feeds it leave of the voltage of each phase.
+    fn parts(&self) -> [f64; 3] {
+        let own = |phase| match self.condition {
+            Condition::Normal | Condition::Reversed => 1.0,
+            Condition::Failed => 0.0,
+            Condition::Sagging => SAG,
+            Condition::Swelling => SWELL,
+            Condition::Lost(lost) => f64::from(u8::from(phase != lost)),
+            Condition::Flickering => self.flicker.part,
+        };
+        let supplied = self.supply.map_or([1.0; 3], |supply| supply.parts);
+        std::array::from_fn(|phase| own(phase) * supplied[phase])
     }
 }
 
@@ -152,8 +174,7 @@ impl Flicker {
         Self { part: 1.0, left: 0.0 }
     }
 
-    /// Part of the voltage that is there.
-    fn step(&mut self, dt: f64, random: &mut Random) -> f64 {
+    fn step(&mut self, dt: f64, random: &mut Random) {
         self.left -= dt;
         if self.left <= 0.0 {
             (self.part, self.left) = match self.part {
@@ -161,7 +182,6 @@ impl Flicker {
                 _ => (1.0, random.between(1.0, 6.0)),
             };
         }
-        self.part
     }
 }
 
@@ -195,6 +215,23 @@ mod tests {
         }
         assert_eq!(run(&mut grid(Condition::Failed), 3.0), ([0.0; 3], 0.0));
         assert!(grid(Condition::Reversed).is_reversed());
+    }
+
+    #[test]
+    fn what_feeds_it_is_what_it_has() {
+        let supply = |parts, frequency| Some(Supply { parts, frequency, reversed: false });
+        let mut grid = grid(Condition::Normal);
+        grid.supply = supply([1.0, 0.7, 0.0], 49.7);
+        let (volts, hertz) = run(&mut grid, 3.0);
+        assert!(volts[0] > 225.0 && (155.0..170.0).contains(&volts[1]) && volts[2] == 0.0, "{volts:?}");
+        assert!(hertz == 49.7 && grid.is_alive());
+        grid.supply = supply([0.0; 3], 0.0);
+        assert_eq!(run(&mut grid, 3.0), ([0.0; 3], 0.0));
+        assert!(!grid.is_alive());
+        grid.supply = Some(Supply { parts: [1.0; 3], frequency: 50.0, reversed: true });
+        assert!(run(&mut grid, 3.0).0[0] > 225.0 && grid.is_alive() && grid.is_reversed());
+        grid.condition = Condition::Reversed;
+        assert!(!grid.is_reversed(), "twice is not at all");
     }
 
     #[test]

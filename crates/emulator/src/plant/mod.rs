@@ -30,10 +30,11 @@ pub(crate) use compressor_levers::COMPRESSOR_LEVERS;
 pub(crate) use electrical::{Energy, Feed};
 pub(crate) use engine::Engine;
 pub(crate) use governor::Regulation;
+pub(crate) use grid::Supply;
 pub(crate) use levers::LEVERS;
 pub(crate) use parallel::Synchronism;
 pub(crate) use senders::Readings;
-pub(crate) use sisters::Sisters;
+pub(crate) use sisters::{Offer, Sisters};
 pub(crate) use supplies::{Battery, Tank};
 
 use crate::random::{Random, approach};
@@ -46,6 +47,7 @@ use grid::{DEAD_PHASE, Grid};
 use load::{Load, NO_LOAD, PhaseLoads, tenth};
 use parallel::{Coupling, Set, live_average};
 use senders::Senders;
+use sisters::Feeding;
 use supplies::Service;
 
 /// Nameplate of the imitated genset: 100 kVA, 230/400 V, 50 Hz, four poles.
@@ -188,6 +190,21 @@ impl Plant {
         self.grid.outage = failed;
     }
 
+    /// Says what feeds the line to the mains meter from now on.
+    pub(crate) fn supply(&mut self, supply: Supply) {
+        self.grid.supply = Some(supply);
+    }
+
+    /// What this genset and the consumers behind it are to the bus bar that it shares with others.
+    pub(crate) fn offer(&self) -> Offer {
+        self.sisters.offer(self.genset.voltage)
+    }
+
+    /// Says what the others on its bus bar are to it.
+    pub(crate) fn join(&mut self, others: Offer) {
+        self.sisters.others = Some(others);
+    }
+
     /// Whether genset and grid feed one busbar.
     pub(crate) fn is_parallel(&self) -> bool {
         self.is_joined() && self.grid.is_alive()
@@ -309,11 +326,16 @@ impl Plant {
         let busbar = match (parallel || on_genset, on_mains) {
             (true, _) => terminals,
             (_, true) => grid.0,
-            _ => [0.0; 3],
+            _ => self.sisters.fed(),
         };
         let hour = Climate::hour(self.time);
         let load = self.load.step(dt, hour, busbar, &mut self.random);
-        let shared = self.sisters.share(dt, on_genset && !parallel, load, &mut self.random);
+        let feeding = match (on_mains, on_genset) {
+            (true, _) => Feeding::Mains,
+            (false, true) => Feeding::Genset,
+            (false, false) => Feeding::Nobody,
+        };
+        let shared = self.sisters.share(dt, feeding, load, &mut self.random);
         match (on_mains, on_genset) {
             _ if parallel => {
                 let set = Set {

@@ -2,15 +2,15 @@
 
 use std::time::Duration;
 
-use busbar_profile::{DateTime, Findings, Profile, builtin, builtins, nearest};
+use busbar_profile::{DateTime, Findings, builtins};
 use toml::de::DeTable;
 
 use super::step::Stage;
-use super::text::shown;
-use super::values::{Entry, Notes, entries};
 use super::{Scenario, Step};
 use crate::config::Config;
 use crate::device::Device;
+use crate::notes::text::shown;
+use crate::notes::{self, Entry, Notes, entries};
 
 const FILE: [&str; 2] = ["scenario", "steps"];
 const HEAD: [&str; 8] = ["title", "about", "controller", "model", "seed", "clock", "lasts", "settings"];
@@ -21,31 +21,9 @@ const LONGEST: Duration = Duration::from_secs(14 * 86_400);
 const SHORTEST: Duration = Duration::from_secs(1);
 
 pub(super) fn scenario(file: &str, text: &str) -> Result<Scenario, Findings> {
-    let mut notes = Notes::new(file, text);
-    let (root, errors) = DeTable::parse_recoverable(text);
-    for error in errors {
-        let span = error.span().unwrap_or(0..0);
-        let message = error.message().replace('\n', ", ");
-        notes.add(span.clone(), format!("this is not TOML: {message}"), syntax_help(text, span.start));
-    }
-    if !notes.is_clean() {
-        // After a syntax error the rest of the text means who knows what.
-        notes.finish()?;
-        notes = Notes::new(file, text);
-    }
-    let scenario = read(file, root.get_ref(), &mut notes);
-    notes.finish()?;
+    let scenario = notes::read(file, text, |root, notes| read(file, root, notes))?;
     // Without a finding there is a scenario; an empty one plays to its end at once.
     Ok(scenario.unwrap_or_else(|| nothing(file)))
-}
-
-/// What to do about a value that TOML does not understand.
-fn syntax_help(text: &str, at: usize) -> &'static str {
-    let before = text.get(..at).unwrap_or(text).trim_end_matches(|c: char| c.is_alphanumeric());
-    match before.trim_end().ends_with('=') {
-        true => "put texts and durations in quotes, such as mains = \"failed\" or at = \"10s\"",
-        false => "mend the syntax; https://toml.io shows it",
-    }
 }
 
 fn read(file: &str, root: &DeTable<'_>, notes: &mut Notes<'_>) -> Option<Scenario> {
@@ -81,7 +59,7 @@ fn head(file: &str, head: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<(Scen
         match entry.key.as_str() {
             "title" => {
                 titled = true;
-                scenario.title = title(&entry, notes).unwrap_or_default();
+                scenario.title = notes.title(&entry).unwrap_or_default();
             }
             "about" => scenario.about = notes.text(&entry),
             "controller" => controller = Some(entry),
@@ -100,7 +78,7 @@ fn head(file: &str, head: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<(Scen
         notes.missing(head.span.clone(), "[scenario]", "controller", "\"datakom-d\"");
         return None;
     };
-    scenario.profile = profile(&controller, notes)?;
+    scenario.profile = notes.profile(&controller)?;
     if let Some(entry) = &model {
         scenario.model = Some(notes.text(entry)?);
     }
@@ -112,40 +90,11 @@ fn head(file: &str, head: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<(Scen
         }
     };
     for entry in settings.and_then(|settings| notes.table(&settings)).unwrap_or_default() {
-        if let Some(value) = setting(&mut probe, &entry, notes) {
+        if let Some(value) = notes.setting(&mut probe, &entry) {
             scenario.settings.push((entry.key, value));
         }
     }
     Some((scenario, probe))
-}
-
-/// A setting and what it is set to, if the controller can be set so.
-pub(super) fn setting(probe: &mut Device, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<String> {
-    let value = match entry.value.get_ref().as_bool() {
-        Some(yes) => u8::from(yes).to_string(),
-        None => notes.plain(entry)?,
-    };
-    match probe.set(&entry.key, &value) {
-        Ok(()) => Some(value),
-        Err(error) => {
-            notes.add_error(entry.span.clone(), &error);
-            None
-        }
-    }
-}
-
-fn profile(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<&'static Profile> {
-    let key = notes.text(entry)?;
-    let found = builtin(&key);
-    if found.is_none() {
-        let keys: Vec<_> = builtins().iter().map(|profile| profile.key.as_str()).collect();
-        let help = match nearest(&key, keys.iter().copied()) {
-            Some(key) => format!("did you mean `{key}`?"),
-            None => format!("write one of: {}", keys.join(", ")),
-        };
-        notes.add(entry.value.span(), format!("there is no controller `{}`", shown(&key)), help);
-    }
-    found
 }
 
 fn clock(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<DateTime> {
@@ -156,15 +105,6 @@ fn clock(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<DateTime> {
         notes.add(entry.value.span(), format!("`{}` is no date with a time", shown(&text)), help);
     }
     clock
-}
-
-fn title(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<String> {
-    let title = notes.text(entry)?;
-    let fits = (1..=100).contains(&title.trim().chars().count()) && !title.contains(char::is_control);
-    if !fits {
-        notes.add(entry.value.span(), "this is no title", "write 1 to 100 characters on one line");
-    }
-    fits.then(|| title.trim().to_owned())
 }
 
 fn steps(scenario: &Scenario, probe: Device, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Vec<Step> {

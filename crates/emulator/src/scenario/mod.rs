@@ -13,8 +13,6 @@ mod parse;
 mod player;
 mod report;
 mod step;
-mod text;
-mod values;
 
 #[cfg(test)]
 mod tests;
@@ -25,6 +23,7 @@ use busbar_profile::command::Verdict;
 use busbar_profile::{Command, DateTime, Findings, Profile};
 
 use crate::config::Config;
+use crate::notes::Place;
 use condition::Condition;
 
 pub(crate) use player::Player;
@@ -54,13 +53,6 @@ struct Step {
     /// In the order of the file.
     actions: Vec<Action>,
     expectations: Vec<Expectation>,
-}
-
-/// Where something stands in the file, both from 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Place {
-    line: usize,
-    column: usize,
 }
 
 /// When a step is taken, once its turn has come.

@@ -8,8 +8,8 @@ use busbar_profile::command::{Arguments, Frame, Next, ReadFailure, Report, Run, 
 use busbar_profile::plan::plan;
 use busbar_profile::{Command, Profile};
 
-use super::Place;
 use crate::device::Device;
+use crate::notes::Place;
 use crate::rules::{COIL_OFF, COIL_ON};
 
 /// A command under way.

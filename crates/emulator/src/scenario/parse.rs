@@ -6,8 +6,8 @@ use std::time::Duration;
 use busbar_profile::{Number, Profile, nearest};
 
 use super::condition::{Comparison, Condition};
-use super::text::{duration, shown};
 use crate::facts::{FactKind, Subject};
+use crate::notes::text::{duration, shown};
 
 /// Longest condition, in bytes: what is deeper nested than this nobody reads.
 const LONGEST: usize = 500;

@@ -10,9 +10,10 @@ use super::expectation::Watch;
 use super::narrator::Narrator;
 use super::order::Order;
 use super::report::Seen;
-use super::text::in_words;
-use super::{Action, Check, CheckVerdict, Event, EventKind, Place, Report, Scenario, Step, Trigger};
+use super::{Action, Check, CheckVerdict, Event, EventKind, Report, Scenario, Step, Trigger};
 use crate::device::{Device, STEP};
+use crate::notes::Place;
+use crate::notes::text::in_words;
 
 /// A scenario under way.
 #[derive(Debug)]

@@ -7,10 +7,10 @@ use busbar_profile::command::{Proof, Verdict};
 use busbar_profile::{DateTime, Profile, nearest};
 use toml::de::DeTable;
 
-use super::text::{in_words, shown};
-use super::values::{Entry, Notes, flat};
-use super::{Action, Expectation, Step, Trigger, load, parse};
+use super::{Action, Expectation, Step, Trigger, parse};
 use crate::device::Device;
+use crate::notes::text::{in_words, shown};
+use crate::notes::{Entry, Notes, flat};
 
 /// Keys of a step that are no levers. No plant has a lever of such a name.
 pub(super) const KEYS: [&str; 14] = [
@@ -273,7 +273,7 @@ impl Stage {
     fn settings(&mut self, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Vec<Action> {
         let mut actions = Vec::new();
         for entry in notes.table(entry).unwrap_or_default() {
-            if let Some(value) = load::setting(&mut self.probe, &entry, notes) {
+            if let Some(value) = notes.setting(&mut self.probe, &entry) {
                 actions.push(Action::Set { setting: entry.key, value });
             }
         }

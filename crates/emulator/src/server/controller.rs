@@ -7,12 +7,14 @@ use busbar_link::Endpoint;
 
 use super::clock::{Pace, STRIDE, SpeedError};
 use super::door::Served;
+use super::group::Group;
 use crate::device::Device;
 
 /// One controller of an [`Emulation`](crate::Emulation) that runs. It stays as it is when that has ended.
 #[derive(Clone, Debug)]
 pub struct Controller {
     pub(super) served: Arc<Served>,
+    pub(super) group: Arc<Group>,
     pub(super) endpoints: Vec<Endpoint>,
 }
 
@@ -28,14 +30,14 @@ impl Controller {
         &self.endpoints
     }
 
-    /// How its clock runs.
+    /// How its clock runs. Controllers whose plants are joined have one clock together.
     pub fn pace(&self) -> Pace {
-        self.served.clock().pace()
+        self.group.clock().pace()
     }
 
     /// Stops its clock, or lets it go on. Requests are answered all the same.
     pub fn pause(&self, paused: bool) {
-        self.served.clock().pause(paused);
+        self.group.clock().pause(paused);
     }
 
     /// Changes how fast its clock runs, simulated seconds a second.
@@ -43,7 +45,7 @@ impl Controller {
     /// # Errors
     /// No clock runs so fast, or backwards.
     pub fn run_at(&self, speed: f64) -> Result<(), SpeedError> {
-        self.served.clock().run_at(speed)
+        self.group.clock().run_at(speed)
     }
 
     /// Lets so much simulated time pass now, whether its clock runs or not. An hour is some work; other tasks of the
@@ -52,7 +54,7 @@ impl Controller {
         let mut left = by;
         while !left.is_zero() {
             let stride = left.min(STRIDE);
-            self.served.live(|clock| clock.step(stride));
+            self.group.live(|clock| clock.step(stride));
             left -= stride;
         }
     }

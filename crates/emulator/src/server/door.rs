@@ -9,7 +9,6 @@ use busbar_modbus::stream::Frame;
 use busbar_modbus::{ExceptionCode, Framing, Losses, Request, Response, mbap, rtu};
 use tokio::sync::{Semaphore, watch};
 
-use super::clock::Clock;
 use crate::device::Device;
 
 /// What has happened on the wires of an imitation.
@@ -41,35 +40,22 @@ impl std::ops::AddAssign for Statistics {
     }
 }
 
-/// A device that several endpoints may share, and its clock.
+/// A device that several endpoints may share.
 #[derive(Debug)]
 pub(super) struct Served {
     device: Mutex<Device>,
-    clock: Mutex<Clock>,
     /// Tells when the device restarts, which drops the connections of its own Ethernet port.
     pub(super) restarts: watch::Sender<()>,
 }
 
 impl Served {
-    pub(super) fn new(device: Device, clock: Clock) -> Self {
-        Self { device: Mutex::new(device), clock: Mutex::new(clock), restarts: watch::Sender::new(()) }
+    pub(super) fn new(device: Device) -> Self {
+        Self { device: Mutex::new(device), restarts: watch::Sender::new(()) }
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Device> {
         // A panel that panicked would have been caught half-way; registers are still registers.
         self.device.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(super) fn clock(&self) -> MutexGuard<'_, Clock> {
-        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Lets the device live until the time that the clock then says. All its time passes here: whoever moves the clock
-    /// holds it meanwhile, so that nobody else does.
-    pub(super) fn live(&self, pass: impl FnOnce(&mut Clock) -> Duration) {
-        let mut clock = self.clock();
-        let now = pass(&mut clock);
-        self.lock().advance(now);
     }
 }
 

@@ -4,6 +4,7 @@ mod bind;
 mod clock;
 mod controller;
 mod door;
+mod group;
 mod line;
 mod pty;
 mod serial;
@@ -23,12 +24,14 @@ use tokio::time::{Instant, MissedTickBehavior, interval};
 use crate::config::Config;
 use crate::device::{Device, STEP};
 use crate::error::StartError;
+use crate::fleet::{Fleet, Joint};
 use bind::Socket;
 use clock::{Clock, STRIDE};
 pub use clock::{Pace, SpeedError};
 pub use controller::Controller;
 pub use door::Statistics;
 use door::{Door, Served};
+use group::{Group, groups};
 
 /// A plant that is faster than the machine gets so much of the machine's time each tick.
 const MOST_WORK: Duration = Duration::from_millis(40);
@@ -54,34 +57,63 @@ pub async fn start(config: Config) -> Result<Emulation, StartError> {
 /// # Errors
 /// As [`start`]; and two controllers have the same unit id.
 pub async fn start_together(configs: Vec<Config>, listen: Vec<Endpoint>) -> Result<Emulation, StartError> {
+    let everybody: Vec<usize> = (0..configs.len()).collect();
+    let wires: Vec<_> = listen.into_iter().map(|endpoint| (endpoint, everybody.clone())).collect();
+    let devices = devices(&configs, &wires)?;
+    serve(&configs, devices, &wires, &[]).await
+}
+
+/// Starts the controllers of a fleet on their wires, with their plants joined: binds every wire or none.
+///
+/// # Errors
+/// As [`start_together`]; and a controller's levers are not as the fleet wants them.
+pub async fn start_fleet(fleet: Fleet) -> Result<Emulation, StartError> {
+    let mut wires: Vec<Wire> = fleet.wires.into_iter().map(|endpoint| (endpoint, Vec::new())).collect();
+    for (index, member) in fleet.members.iter().enumerate() {
+        if let Some((_, members)) = wires.get_mut(member.wire) {
+            members.push(index);
+        }
+    }
+    let (configs, levers): (Vec<_>, Vec<_>) =
+        fleet.members.into_iter().map(|member| (member.config, member.levers)).unzip();
+    let mut devices = devices(&configs, &wires)?;
+    for (device, levers) in devices.iter_mut().zip(levers) {
+        for (lever, position) in levers {
+            device.pull(&lever, &position)?;
+        }
+    }
+    serve(&configs, devices, &wires, &fleet.joints).await
+}
+
+/// A wire that controllers share: where it is, and their indices.
+type Wire = (Endpoint, Vec<usize>);
+
+fn devices(configs: &[Config], wires: &[Wire]) -> Result<Vec<Device>, StartError> {
     if configs.is_empty() {
         return Err(StartError::NoController);
     }
     let mut devices = Vec::new();
-    for config in &configs {
+    for (index, config) in configs.iter().enumerate() {
         Pace::check(config.speed)?;
-        if listen.is_empty() && config.listen.is_empty() {
+        if config.listen.is_empty() && !wires.iter().any(|(_, members)| members.contains(&index)) {
             return Err(StartError::NoEndpoint);
         }
         devices.push(Device::new(config)?);
     }
-    serve(&configs, devices, &listen).await
+    Ok(devices)
 }
 
 async fn serve(
     configs: &[Config],
     devices: Vec<Device>,
-    listen: &[Endpoint],
+    wires: &[Wire],
+    joints: &[Joint],
 ) -> Result<Emulation, StartError> {
     let served: Vec<_> = devices
         .into_iter()
-        .zip(configs)
-        .map(|(device, config)| {
-            let clock = Clock::new(config.speed);
-            (device.unit(), device.profile(), Arc::new(Served::new(device, clock)))
-        })
+        .map(|device| (device.unit(), device.profile(), Arc::new(Served::new(device))))
         .collect();
-    let rooms = rooms(configs, listen);
+    let rooms = rooms(configs, wires);
     for room in &rooms {
         room.check(&served)?;
     }
@@ -91,17 +123,11 @@ async fn serve(
     }
 
     let mut tasks = JoinSet::new();
-    for (_, _, device) in &served {
-        tasks.spawn(tick(Arc::clone(device)));
-    }
-    let mut controllers: Vec<_> = served
-        .iter()
-        .map(|(_, _, device)| Controller { served: Arc::clone(device), endpoints: Vec::new() })
-        .collect();
+    let mut controllers = controllers(configs, &served, joints, &mut tasks);
     let (mut urls, mut doors) = (Vec::new(), Vec::new());
     for ((url, socket), room) in sockets {
-        for (index, controller) in controllers.iter_mut().enumerate() {
-            if room.reaches(index) {
+        for index in &room.members {
+            if let Some(controller) = controllers.get_mut(*index) {
                 controller.endpoints.push(url.clone());
             }
         }
@@ -112,6 +138,30 @@ async fn serve(
         doors.push(door);
     }
     Ok(Emulation { urls, controllers, doors, tasks })
+}
+
+/// A hold on each controller, whose clocks run from now on; those whose plants are joined have one together, which runs as
+/// the first of them is to.
+fn controllers(
+    configs: &[Config],
+    served: &[Member],
+    joints: &[Joint],
+    tasks: &mut JoinSet<()>,
+) -> Vec<Controller> {
+    let mut controllers = Vec::new();
+    for members in groups(served.len(), joints) {
+        let devices: Vec<_> = members.iter().map(|index| Arc::clone(&served[*index].2)).collect();
+        let joints = joints.iter().filter_map(|joint| joint.within(&members)).collect();
+        let group = Arc::new(Group::new(Clock::new(configs[members[0]].speed), devices, joints));
+        tasks.spawn(tick(Arc::clone(&group)));
+        for index in members {
+            let served = Arc::clone(&served[index].2);
+            let controller = Controller { served, group: Arc::clone(&group), endpoints: Vec::new() };
+            controllers.push((index, controller));
+        }
+    }
+    controllers.sort_by_key(|(index, _)| *index);
+    controllers.into_iter().map(|(_, controller)| controller).collect()
 }
 
 /// A running imitation; dropping it ends it.
@@ -160,31 +210,26 @@ type Member = (u8, &'static busbar_profile::Profile, Arc<Served>);
 /// An endpoint to be, and who is to answer there.
 struct Room<'a> {
     endpoint: &'a Endpoint,
-    /// Index of the only device; none where all of them are reached.
-    only: Option<usize>,
+    /// Indices of the devices that are reached.
+    members: Vec<usize>,
     places: Arc<Semaphore>,
     idle: Duration,
 }
 
-fn rooms<'a>(configs: &'a [Config], listen: &'a [Endpoint]) -> Vec<Room<'a>> {
+fn rooms<'a>(configs: &'a [Config], wires: &'a [Wire]) -> Vec<Room<'a>> {
     let places = |connections: usize| Arc::new(Semaphore::new(connections.min(Semaphore::MAX_PERMITS)));
-    let shared = configs.iter().map(|config| config.connections).min().unwrap_or_default();
-    let shared_places = places(shared);
-    let shared_idle = configs.iter().map(|config| config.idle).min().unwrap_or_default();
-    let mut rooms: Vec<_> = listen
-        .iter()
-        .map(|endpoint| Room {
-            endpoint,
-            only: None,
-            places: Arc::clone(&shared_places),
-            idle: shared_idle.min(LONGEST_IDLE),
-        })
-        .collect();
+    let mut rooms = Vec::new();
+    for (endpoint, members) in wires {
+        let reached = || members.iter().filter_map(|index| configs.get(*index));
+        let connections = reached().map(|config| config.connections).min().unwrap_or_default();
+        let idle = reached().map(|config| config.idle).min().unwrap_or_default().min(LONGEST_IDLE);
+        rooms.push(Room { endpoint, members: members.clone(), places: places(connections), idle });
+    }
     for (index, config) in configs.iter().enumerate() {
         let places = places(config.connections);
         rooms.extend(config.listen.iter().map(|endpoint| Room {
             endpoint,
-            only: Some(index),
+            members: vec![index],
             places: Arc::clone(&places),
             idle: config.idle.min(LONGEST_IDLE),
         }));
@@ -193,13 +238,8 @@ fn rooms<'a>(configs: &'a [Config], listen: &'a [Endpoint]) -> Vec<Room<'a>> {
 }
 
 impl Room<'_> {
-    /// Whether the controller of this index is reached here.
-    fn reaches(&self, index: usize) -> bool {
-        self.only.is_none_or(|only| only == index)
-    }
-
     fn members<'m>(&self, served: &'m [Member]) -> impl Iterator<Item = &'m Member> {
-        served.iter().enumerate().filter(|(index, _)| self.reaches(*index)).map(|(_, member)| member)
+        self.members.iter().filter_map(|index| served.get(*index))
     }
 
     /// Whether these controllers can be on one wire, and on this one.
@@ -225,19 +265,19 @@ impl Room<'_> {
     }
 }
 
-/// Lets the clock of a plant run, at most as fast as leaves room for whoever reads it.
-async fn tick(device: Arc<Served>) {
+/// Lets the clock of a group run, at most as fast as leaves room for whoever reads its registers.
+async fn tick(group: Arc<Group>) {
     let mut interval = interval(STEP);
     interval.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut last = Instant::now();
     loop {
         interval.tick().await;
         let now = Instant::now();
-        let mut due = device.clock().due(now.duration_since(last));
+        let mut due = group.clock().due(now.duration_since(last));
         last = now;
         while !due.is_zero() && now.elapsed() < MOST_WORK {
             let stride = due.min(STRIDE);
-            device.live(|clock| clock.run(stride));
+            group.live(|clock| clock.run(stride));
             due -= stride;
             yield_now().await;
         }

@@ -18,6 +18,8 @@ const MAINS: &[Word] = &[
     Word::new("reversed", "Two phases are swapped"),
     Word::new("flickering", "Short dips that follow each other"),
 ];
+const GRID: &[Word] =
+    &[Word::new("normal", "It feeds both"), Word::new("failed", "Neither source has voltage from it")];
 const NORMAL: &[Word] = &[Word::new("normal", "As it is by itself")];
 const SWITCH: &[Word] = &[
     Word::new("normal", "It does as it is told"),
@@ -72,6 +74,7 @@ macro_rules! levers {
 
 /// In the order in which people are shown them.
 pub(super) const LEVERS: &[Lever] = levers! {
+    Lever::of_words("grid", "Grid behind both sources", GRID),
     Lever::of_words("src1", "Mains of source 1", MAINS),
     Lever::of_numbers("src1.voltage", "Source 1, phase to neutral", NORMAL, (0.0, 9000.0), "V"),
     Lever::of_numbers("src1.frequency", "Source 1, frequency", NORMAL, (40.0, 60.0), "Hz"),
@@ -131,6 +134,7 @@ pub(super) const LEVERS: &[Lever] = levers! {
 /// What a lever acts upon. Sources, sides and modules count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Handle {
+    Grid,
     Mains(usize),
     Voltage(usize),
     Frequency(usize),
@@ -160,6 +164,7 @@ impl Handle {
             "input" => contact(rest).map(Self::Contact),
             "module" => Self::of_module(rest),
             "front" => Some(Self::Front),
+            "grid" => Some(Self::Grid),
             "genset" => Some(Self::Genset(1)),
             "genset1" => Some(Self::Genset(0)),
             _ => Self::of_side(first, rest),
@@ -247,6 +252,7 @@ impl Hat821si {
         let more = |number: f64, word| or(Some(number).filter(|number| *number != 0.0), word);
         let either = |is_so: bool, [no, yes]: [&'static str; 2]| Position::Word(if is_so { yes } else { no });
         Some(match Handle::of(id)? {
+            Handle::Grid => either(plant.grid.failed, ["normal", "failed"]),
             Handle::Mains(source) => Position::Word(mains_word(plant.sources[source].mains)),
             Handle::Voltage(source) => or(plant.sources[source].set_voltage, "normal"),
             Handle::Frequency(source) => or(plant.sources[source].set_frequency, "normal"),
@@ -316,6 +322,7 @@ impl Hat821si {
     fn set_word(&mut self, handle: Handle, word: &str) {
         let plant = &mut self.plant;
         match handle {
+            Handle::Grid => plant.grid.failed = word == "failed",
             Handle::Mains(source) => plant.sources[source].mains = mains(word),
             Handle::Wire(source) => {
                 plant.sources[source].broken_wire =
@@ -429,6 +436,6 @@ mod tests {
         for (place, lever) in LEVERS.iter().enumerate() {
             assert!(LEVERS[..place].iter().all(|other| other.id != lever.id && other.name != lever.name));
         }
-        assert_eq!(LEVERS.len(), 51 + 48);
+        assert_eq!(LEVERS.len(), 52 + 48);
     }
 }

@@ -32,6 +32,7 @@ use busbar_profile::DateTime;
 use crate::bank::Bank;
 use crate::levers::{Lever, Position};
 use crate::panel::Panel;
+use crate::plant::Supply;
 use crate::random::Random;
 use crate::rules::Refusals;
 use crate::settings::Settings;
@@ -491,6 +492,10 @@ impl Panel for Hat821si {
 
     fn pull(&mut self, id: &str, to: Position) {
         self.pull_to(id, to);
+    }
+
+    fn section(&self, section: usize) -> Option<Supply> {
+        (section < 2).then(|| self.plant.supply(section))
     }
 
     fn inject(&mut self, point: &str, bit: u16, active: bool) -> bool {

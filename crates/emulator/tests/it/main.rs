@@ -5,6 +5,7 @@ mod acc1700;
 mod control;
 mod datakom_d;
 mod dkg705;
+mod fleet;
 mod golden;
 mod hat821si;
 mod identities;

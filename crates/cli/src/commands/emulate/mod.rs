@@ -1,15 +1,20 @@
-//! `busbar emulate`: one imitated controller on one or more ports and lines, and the scenario that happens to it.
+//! `busbar emulate`: one imitated controller on one or more ports and lines, and the scenario that happens to it; or a fleet.
 
+mod fleet;
 mod scenario;
 
-use busbar_emulator::{Config, StartError};
+use std::path::Path;
+
+use busbar_emulator::{Config, Scenario, StartError};
 use busbar_link::Endpoint;
-use busbar_profile::DateTime;
+use busbar_profile::{DateTime, Findings};
 use jiff::Zoned;
 use serde::Serialize;
 
 use super::{control, run};
 use crate::{args, failure::Failure, logging, profiles, runtime, terminal, wall_clock};
+
+pub(crate) use fleet::{Imitation, imitations};
 
 /// Where it answers, as `--json` prints it.
 #[derive(Serialize)]
@@ -21,13 +26,19 @@ struct Bound<'a> {
 
 pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
     logging::start("warn", logging::Format::Text)?;
-    let profile = profiles::resolve(&args.key)?;
-    let scenario = args.scenario.as_deref().map(scenario::load).transpose()?;
+    if let Some(file) = &args.fleet {
+        return fleet::run(file, &args, json);
+    }
+    // One of the two is there: the command line saw to it.
+    let key = args.key.unwrap_or_default();
+    let profile = profiles::resolve(&key)?;
+    let scenario = args.scenario.as_deref();
+    let scenario = scenario.map(|file| read(file, "scenario file", Scenario::parse)).transpose()?;
     let is_played = scenario.is_some();
     let usual = scenario.map_or_else(Config::default, |scenario| scenario.config());
     let config = Config {
         unit: args.unit.or(profile.wire.unit.default).unwrap_or(1),
-        profile: args.key,
+        profile: key,
         model: args.model.or(usual.model),
         listen: args.listen.into_iter().chain(args.more).collect(),
         seed: args.seed.unwrap_or(usual.seed),
@@ -41,7 +52,7 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
     runtime::service(async |mut stop| {
         let emulation = busbar_emulator::start(config).await.map_err(failure)?;
         let control = match args.control {
-            Some(address) => Some(control::serve(address, &emulation, token).await?),
+            Some(address) => Some(control::serve(address, control::alone(&emulation), token).await?),
             None => None,
         };
         let (urls, page) = (emulation.urls(), control.as_ref().map(|control| run::page(control.address())));
@@ -67,6 +78,21 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
         emulation.stop().await;
         done
     })
+}
+
+/// What a file says. What is wrong with it is wrong with the call.
+fn read<T>(
+    path: &Path,
+    what: &str,
+    parse: impl FnOnce(&str, &str) -> Result<T, Findings>,
+) -> Result<T, Failure> {
+    let text = profiles::read(path, what).map_err(|failure| match failure {
+        Failure::Failed(sentence) => Failure::Call(sentence),
+        other => other,
+    })?;
+    let name = path.display().to_string();
+    parse(&name, &text)
+        .map_err(|findings| Failure::CallFindings(Box::new(profiles::excerpts(&name, text, &findings))))
 }
 
 /// What a calendar says that was set by this machine's clock.

@@ -1,8 +1,8 @@
-//! `--scenario FILE`: reads it, tells what happens while it is played, and says in the end what became of it.
+//! `--scenario FILE`: tells what happens while it is played, and says in the end what became of it.
 
-use std::{path::Path, time::Duration};
+use std::time::Duration;
 
-use busbar_emulator::{Emulation, Event, EventKind, Report, Scenario};
+use busbar_emulator::{Emulation, Event, EventKind, Report};
 use busbar_link::Endpoint;
 use serde::Serialize;
 use tokio::{
@@ -10,7 +10,7 @@ use tokio::{
     time::{MissedTickBehavior, interval},
 };
 
-use crate::{failure::Failure, profiles, runtime::Stop, terminal};
+use crate::{failure::Failure, runtime::Stop, terminal};
 
 /// How often somebody looks what has happened.
 const LOOK: Duration = Duration::from_millis(100);
@@ -21,17 +21,6 @@ struct Played<'a> {
     urls: &'a [Endpoint],
     #[serde(flatten)]
     report: &'a Report,
-}
-
-/// The scenario of a file. What is wrong with it is wrong with the call: 1 means that an expectation failed.
-pub(super) fn load(path: &Path) -> Result<Scenario, Failure> {
-    let text = profiles::read(path, "scenario file").map_err(|failure| match failure {
-        Failure::Failed(sentence) => Failure::Call(sentence),
-        other => other,
-    })?;
-    let name = path.display().to_string();
-    Scenario::parse(&name, &text)
-        .map_err(|findings| Failure::CallFindings(Box::new(profiles::excerpts(&name, text, &findings))))
 }
 
 /// Waits for the end of the scenario, or for a signal to stop, which ends it undecided.

@@ -86,12 +86,12 @@ fn sisters_on_the_bus_bar_share_the_load_and_go_with_this_set() {
     pull(&mut plant, "load.power_factor", "0.8");
     pull(&mut plant, "busbar.gensets", "2");
     run(&mut plant, &controls, 60.0);
-    assert_eq!(plant.sisters.on_bus(), 2);
+    assert_eq!(plant.sisters.sets(), 3.0);
     let (own, others) = (plant.genset.total_active(), plant.sisters.active());
     assert!((18.5..21.5).contains(&own) && (own + others - 60.0).abs() < 0.05, "{own} {others}");
     controls.genset_breaker = false;
     run(&mut plant, &controls, 1.0);
-    assert_eq!((plant.sisters.on_bus(), plant.sisters.active()), (0, 0.0));
+    assert_eq!((plant.sisters.sets(), plant.sisters.active()), (1.0, 0.0));
 }
 
 #[test]

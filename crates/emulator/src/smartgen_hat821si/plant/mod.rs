@@ -9,6 +9,7 @@ mod mechanism;
 mod section;
 mod source;
 
+use crate::plant::Supply;
 use crate::random::{Drift, Random};
 
 use super::switches::{Drive, FEEDERS, Positions, Switch};
@@ -62,8 +63,9 @@ pub(super) struct Plant {
     pub(super) engines: [Engine; 2],
     /// The relays of QS1, QTIE and QS2 that have operated and were not reset.
     pub(super) relays: [bool; 3],
+    /// What both sources come from.
+    pub(super) grid: Grid,
     dead_for: [f64; 2],
-    grid: Grid,
     random: Random,
 }
 
@@ -132,6 +134,18 @@ impl Plant {
             !self.sections[section].short_circuit
                 && (0..2).any(|source| feeds[section][source] && self.is_live(source))
         })
+    }
+
+    /// What a section gives to whatever hangs on it.
+    pub(super) fn supply(&self, section: usize) -> Supply {
+        let none = Supply { parts: [0.0; 3], frequency: 0.0, reversed: false };
+        if self.sections[section].short_circuit {
+            return none;
+        }
+        let feeding =
+            (0..2).filter(|source| self.feeds()[section][*source]).map(|source| &self.sources[source]);
+        let best = feeding.max_by(|a, b| a.average_part().total_cmp(&b.average_part()));
+        best.map_or(none, Source::supply)
     }
 
     /// Both sources are there and joined.
@@ -255,7 +269,9 @@ impl Plant {
 
 /// What both mains hang on.
 #[derive(Clone, Debug)]
-struct Grid {
+pub(super) struct Grid {
+    /// It gives nothing to either of them.
+    pub(super) failed: bool,
     /// Hz.
     frequency: f64,
     /// Degrees against a clock of exactly 50 Hz.
@@ -266,6 +282,7 @@ struct Grid {
 impl Grid {
     fn new(random: &mut Random) -> Self {
         Self {
+            failed: false,
             frequency: RATED_FREQUENCY,
             angle: random.between(0.0, 360.0),
             drift: Drift::new(0.012, 8.0, random),

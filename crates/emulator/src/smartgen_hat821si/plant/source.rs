@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-use crate::plant::{Energy, Feed};
+use crate::plant::{Energy, Feed, Supply};
 use crate::random::{Drift, Random, approach};
 
 use super::section::Demand;
@@ -142,6 +142,15 @@ impl Source {
         self.feed.average_voltage() / PHASE_VOLTAGE
     }
 
+    /// What it gives to whoever is connected.
+    pub(super) fn supply(&self) -> Supply {
+        Supply {
+            parts: self.feed.voltage.map(|volts| volts / PHASE_VOLTAGE),
+            frequency: self.feed.frequency,
+            reversed: self.is_reversed(),
+        }
+    }
+
     /// V from phase to neutral that its mains have, were they not ill.
     pub(in super::super) fn mains_voltage(&self) -> f64 {
         self.set_voltage.unwrap_or(PHASE_VOLTAGE + 40.0 + self.level.value())
@@ -210,7 +219,8 @@ impl Source {
 
     pub(super) fn step(&mut self, dt: f64, around: Surroundings, grid: &Grid, random: &mut Random) {
         self.time += dt;
-        let on_genset = around.genset && (around.on_load || !self.mains_are_healthy());
+        let mains_fail = grid.failed || !self.mains_are_healthy();
+        let on_genset = around.genset && (around.on_load || mains_fail);
         if on_genset != self.on_genset {
             self.on_genset = on_genset;
             self.changing = CHANGEOVER;
@@ -219,6 +229,7 @@ impl Source {
         let remains = match (self.changing > 0.0, on_genset) {
             (true, _) => [0.0; 3],
             (false, true) => [1.0; 3],
+            (false, false) if grid.failed => [0.0; 3],
             (false, false) => self.mains.remains(self.time),
         };
         for (part, target) in self.parts.iter_mut().zip(remains) {

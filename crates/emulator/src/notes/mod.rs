@@ -1,17 +1,61 @@
-//! Typed values out of parsed TOML, each with its place, and the findings where one is wrong.
+//! TOML files of people: typed values with their places, and a finding with a remedy where one is wrong.
+
+pub(crate) mod text;
 
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
-use busbar_profile::{Collector, Findings, nearest};
+use busbar_profile::{Collector, Findings, Profile, builtin, builtins, nearest};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::Place;
-use super::text::{duration, in_words, shown};
+use crate::device::Device;
+use text::{duration, in_words, shown};
+
+/// Where something stands in a file, both from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    pub(crate) line: usize,
+    pub(crate) column: usize,
+}
+
+/// Reads a file whose name only serves the findings. Nothing comes of a text in which anything is wrong.
+///
+/// # Errors
+/// Everything that is wrong with it.
+pub(crate) fn read<T>(
+    file: &str,
+    text: &str,
+    understand: impl FnOnce(&DeTable<'_>, &mut Notes<'_>) -> Option<T>,
+) -> Result<Option<T>, Findings> {
+    let mut notes = Notes::new(file, text);
+    let (root, errors) = DeTable::parse_recoverable(text);
+    for error in errors {
+        let span = error.span().unwrap_or(0..0);
+        let message = error.message().replace('\n', ", ");
+        notes.add(span.clone(), format!("this is not TOML: {message}"), syntax_help(text, span.start));
+    }
+    if !notes.is_clean() {
+        // After a syntax error the rest of the text means who knows what.
+        notes.finish()?;
+        notes = Notes::new(file, text);
+    }
+    let understood = understand(root.get_ref(), &mut notes);
+    notes.finish()?;
+    Ok(understood)
+}
+
+/// What to do about a value that TOML does not understand.
+fn syntax_help(text: &str, at: usize) -> &'static str {
+    let before = text.get(..at).unwrap_or(text).trim_end_matches(|c: char| c.is_alphanumeric());
+    match before.trim_end().ends_with('=') {
+        true => "put texts and durations in quotes, such as mains = \"failed\" or at = \"10s\"",
+        false => "mend the syntax; https://toml.io shows it",
+    }
+}
 
 /// The text of a file and what was found wrong with it.
-pub(super) struct Notes<'a> {
+pub(crate) struct Notes<'a> {
     text: &'a str,
     /// Where its lines begin.
     lines: Vec<usize>,
@@ -20,41 +64,41 @@ pub(super) struct Notes<'a> {
 }
 
 /// A key with its value.
-pub(super) struct Entry<'t, 'i> {
+pub(crate) struct Entry<'t, 'i> {
     /// With dots where it lies in tables below.
-    pub(super) key: String,
-    pub(super) span: Range<usize>,
-    pub(super) value: &'t Spanned<DeValue<'i>>,
+    pub(crate) key: String,
+    pub(crate) span: Range<usize>,
+    pub(crate) value: &'t Spanned<DeValue<'i>>,
 }
 
 impl<'a> Notes<'a> {
-    pub(super) fn new(file: &'a str, text: &'a str) -> Self {
+    fn new(file: &'a str, text: &'a str) -> Self {
         let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(newline, _)| newline + 1));
         Self { text, lines: lines.collect(), findings: Collector::new(file, text), clean: true }
     }
 
-    pub(super) fn add(&mut self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) {
+    pub(crate) fn add(&mut self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) {
         self.clean = false;
         self.findings.add(span, message, help);
     }
 
     /// Notes an error of the emulator, whose sentences end with the remedy.
-    pub(super) fn add_error(&mut self, span: Range<usize>, error: &impl ToString) {
+    pub(crate) fn add_error(&mut self, span: Range<usize>, error: &impl ToString) {
         let sentence = error.to_string();
         let halves = sentence.split_once("; ").or_else(|| sentence.split_once(": "));
         let (message, help) = halves.unwrap_or((&sentence, "correct it"));
         self.add(span, message, help);
     }
 
-    pub(super) fn is_clean(&self) -> bool {
+    pub(crate) fn is_clean(&self) -> bool {
         self.clean
     }
 
-    pub(super) fn finish(self) -> Result<(), Findings> {
+    fn finish(self) -> Result<(), Findings> {
         self.findings.finish()
     }
 
-    pub(super) fn place(&self, offset: usize) -> Place {
+    pub(crate) fn place(&self, offset: usize) -> Place {
         let line = self.lines.partition_point(|start| *start <= offset);
         let start = line.checked_sub(1).and_then(|index| self.lines.get(index)).copied().unwrap_or_default();
         let before = self.text.get(start..offset).unwrap_or_default();
@@ -62,7 +106,7 @@ impl<'a> Notes<'a> {
     }
 
     /// Where a part of a text value stands in the file; the whole value where escapes moved it.
-    pub(super) fn inside(&self, value: &Range<usize>, content: &str, part: &Range<usize>) -> Range<usize> {
+    pub(crate) fn inside(&self, value: &Range<usize>, content: &str, part: &Range<usize>) -> Range<usize> {
         let start = value.start + 1;
         match self.text.get(start..value.end.saturating_sub(1)) {
             Some(between) if between == content => start + part.start..start + part.end,
@@ -71,19 +115,60 @@ impl<'a> Notes<'a> {
     }
 
     /// A key that is not there, with what to add.
-    pub(super) fn missing(&mut self, table: Range<usize>, name: &str, key: &str, example: &str) {
+    pub(crate) fn missing(&mut self, table: Range<usize>, name: &str, key: &str, example: &str) {
         self.add(table, format!("`{key}` is missing in {name}"), format!("add `{key} = {example}`"));
     }
 
-    pub(super) fn text(&mut self, entry: &Entry<'_, '_>) -> Option<String> {
+    pub(crate) fn text(&mut self, entry: &Entry<'_, '_>) -> Option<String> {
         match entry.value.get_ref().as_str() {
             Some(text) => Some(text.to_owned()),
             None => self.wrong_type(entry, "a text in quotes"),
         }
     }
 
+    /// What people call something: one line that is not empty.
+    pub(crate) fn title(&mut self, entry: &Entry<'_, '_>) -> Option<String> {
+        let title = self.text(entry)?;
+        let fits = (1..=100).contains(&title.trim().chars().count()) && !title.contains(char::is_control);
+        if !fits {
+            let message = format!("this is no {}", entry.key);
+            self.add(entry.value.span(), message, "write 1 to 100 characters on one line");
+        }
+        fits.then(|| title.trim().to_owned())
+    }
+
+    /// The built-in profile of a key.
+    pub(crate) fn profile(&mut self, entry: &Entry<'_, '_>) -> Option<&'static Profile> {
+        let key = self.text(entry)?;
+        let found = builtin(&key);
+        if found.is_none() {
+            let keys: Vec<_> = builtins().iter().map(|profile| profile.key.as_str()).collect();
+            let help = match nearest(&key, keys.iter().copied()) {
+                Some(key) => format!("did you mean `{key}`?"),
+                None => format!("write one of: {}", keys.join(", ")),
+            };
+            self.add(entry.value.span(), format!("there is no controller `{}`", shown(&key)), help);
+        }
+        found
+    }
+
+    /// A setting and what it is set to, if the controller can be set so.
+    pub(crate) fn setting(&mut self, probe: &mut Device, entry: &Entry<'_, '_>) -> Option<String> {
+        let value = match entry.value.get_ref().as_bool() {
+            Some(yes) => u8::from(yes).to_string(),
+            None => self.plain(entry)?,
+        };
+        match probe.set(&entry.key, &value) {
+            Ok(()) => Some(value),
+            Err(error) => {
+                self.add_error(entry.span.clone(), &error);
+                None
+            }
+        }
+    }
+
     /// One text, or a list of texts, each with its place.
-    pub(super) fn texts(&mut self, entry: &Entry<'_, '_>) -> Vec<(String, Range<usize>)> {
+    pub(crate) fn texts(&mut self, entry: &Entry<'_, '_>) -> Vec<(String, Range<usize>)> {
         let items = match entry.value.get_ref() {
             DeValue::Array(items) => items.iter().collect(),
             _ => vec![entry.value],
@@ -102,7 +187,7 @@ impl<'a> Notes<'a> {
     }
 
     /// A text or a number, as text.
-    pub(super) fn plain(&mut self, entry: &Entry<'_, '_>) -> Option<String> {
+    pub(crate) fn plain(&mut self, entry: &Entry<'_, '_>) -> Option<String> {
         match entry.value.get_ref() {
             DeValue::String(text) => Some(text.as_ref().to_owned()),
             DeValue::Integer(integer) => match i64::from_str_radix(integer.as_str(), integer.radix()) {
@@ -115,7 +200,7 @@ impl<'a> Notes<'a> {
     }
 
     /// A whole number that is not negative.
-    pub(super) fn whole(&mut self, entry: &Entry<'_, '_>) -> Option<u64> {
+    pub(crate) fn whole(&mut self, entry: &Entry<'_, '_>) -> Option<u64> {
         let number = entry.value.get_ref().as_integer();
         match number.and_then(|number| u64::from_str_radix(number.as_str(), number.radix()).ok()) {
             Some(number) => Some(number),
@@ -123,7 +208,7 @@ impl<'a> Notes<'a> {
         }
     }
 
-    pub(super) fn duration(
+    pub(crate) fn duration(
         &mut self,
         entry: &Entry<'_, '_>,
         limits: RangeInclusive<Duration>,
@@ -151,14 +236,14 @@ impl<'a> Notes<'a> {
     }
 
     /// The entries of a table, in the order of the file.
-    pub(super) fn table<'t, 'i>(&mut self, entry: &Entry<'t, 'i>) -> Option<Vec<Entry<'t, 'i>>> {
+    pub(crate) fn table<'t, 'i>(&mut self, entry: &Entry<'t, 'i>) -> Option<Vec<Entry<'t, 'i>>> {
         match entry.value.get_ref().as_table() {
             Some(table) => Some(entries(table)),
             None => self.wrong_type(entry, "a table, such as { name = 1 }"),
         }
     }
 
-    pub(super) fn wrong_type<T>(&mut self, entry: &Entry<'_, '_>, wanted: &str) -> Option<T> {
+    pub(crate) fn wrong_type<T>(&mut self, entry: &Entry<'_, '_>, wanted: &str) -> Option<T> {
         let found = entry.value.get_ref().type_str();
         let message = format!("`{}` has the wrong type ({found})", shown(&entry.key));
         self.add(entry.value.span(), message, format!("write {wanted}"));
@@ -166,7 +251,7 @@ impl<'a> Notes<'a> {
     }
 
     /// Reports a key that is none of the known ones.
-    pub(super) fn unknown_key(&mut self, entry: &Entry<'_, '_>, table: &str, known: &[&str]) {
+    pub(crate) fn unknown_key(&mut self, entry: &Entry<'_, '_>, table: &str, known: &[&str]) {
         let help = match nearest(&entry.key, known.iter().copied()) {
             Some(known) => format!("did you mean `{known}`?"),
             None => format!("write one of: {}", known.join(", ")),
@@ -176,7 +261,7 @@ impl<'a> Notes<'a> {
 }
 
 /// The entries of a table, in the order of the file.
-pub(super) fn entries<'t, 'i>(table: &'t DeTable<'i>) -> Vec<Entry<'t, 'i>> {
+pub(crate) fn entries<'t, 'i>(table: &'t DeTable<'i>) -> Vec<Entry<'t, 'i>> {
     let mut entries: Vec<_> = table
         .iter()
         .map(|(key, value)| Entry { key: key.get_ref().to_string(), span: key.span(), value })
@@ -187,7 +272,7 @@ pub(super) fn entries<'t, 'i>(table: &'t DeTable<'i>) -> Vec<Entry<'t, 'i>> {
 
 /// The entries with what lies in tables below, but for the keys that are tables themselves: `breaker.genset = ...` and
 /// `"breaker.genset" = ...` are the same.
-pub(super) fn flat<'t, 'i>(table: &'t DeTable<'i>, tables: &[&str]) -> Vec<Entry<'t, 'i>> {
+pub(crate) fn flat<'t, 'i>(table: &'t DeTable<'i>, tables: &[&str]) -> Vec<Entry<'t, 'i>> {
     let mut flat = Vec::new();
     for entry in entries(table) {
         flatten(entry, tables, &mut flat);
