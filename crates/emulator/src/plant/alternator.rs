@@ -12,8 +12,13 @@ const REMANENCE: f64 = 4.0;
 const EXCITED_FROM: f64 = 700.0;
 /// Below this part of rated speed the voltage goes down with the speed, to spare the engine.
 const ROLL_OFF: f64 = 0.95;
-/// V that a step of rated load costs until the regulator has answered.
-const DIP: f64 = 14.0;
+/// V that a step of rated load would cost at once: the regulator answers before all of it has come.
+const DIP: f64 = 40.0;
+/// Times the rated current that the exciter can give: with more the voltage sinks.
+const CEILING: f64 = 2.0;
+/// Part of the voltage that is left where a line without its grid hangs on it, and seconds until it has sunk.
+pub(super) const CHOKED: f64 = 0.04;
+const CHOKES: f64 = 0.1;
 /// What a regulator that reads nothing makes of the rated voltage.
 const OVEREXCITED: f64 = 1.22;
 
@@ -41,8 +46,8 @@ impl Alternator {
         Self { voltage: 0.0, avr: Avr::Normal, answered: 0.0 }
     }
 
-    /// Builds up and holds the voltage of a turning alternator.
-    pub(super) fn step(&mut self, dt: f64, rpm: f64, excitation: &Regulation, carried: &Feed) {
+    /// Builds up and holds the voltage of a turning alternator. A line that its grid has left chokes one that feeds it.
+    pub(super) fn step(&mut self, dt: f64, rpm: f64, excitation: &Regulation, carried: &Feed, chokes: bool) {
         let apparent = carried.total_apparent();
         let dip = DIP * (apparent - self.answered) / RATED_KVA;
         approach(&mut self.answered, apparent, 0.4, dt);
@@ -56,10 +61,18 @@ impl Alternator {
             rpm if rpm > EXCITED_FROM => settled * (rpm / (ROLL_OFF * RATED_RPM)).min(1.0),
             _ => remembered,
         };
-        approach(&mut self.voltage, excited.max(0.0), 0.4, dt);
+        let (left, memory) = if chokes { (CHOKED, CHOKES) } else { (ceiling(carried), 0.4) };
+        approach(&mut self.voltage, (left * excited).max(0.0), memory, dt);
         // One that stands has no voltage at all, however slowly the field dies.
         if rpm <= 0.0 {
             self.voltage = 0.0;
         }
     }
+}
+
+/// Part of its voltage that the exciter can hold with this current.
+fn ceiling(carried: &Feed) -> f64 {
+    let rated = RATED_KVA * 1000.0 / 3.0 / RATED_VOLTAGE;
+    let current = carried.average_current() / rated;
+    if current > CEILING { CEILING / current } else { 1.0 }
 }

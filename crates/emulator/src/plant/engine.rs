@@ -19,10 +19,11 @@ pub(super) const MOST_KW: f64 = 104.0;
 const FLYWHEEL: f64 = 100.0;
 /// What the coolant and the block around it store, kJ/K.
 const HEAT_CAPACITY: f64 = 160.0;
-const THERMOSTAT_DEGC: f64 = 80.0;
-/// kW/K that the radiator takes away, clear and blocked.
-const RADIATOR: f64 = 3.0;
-const BLOCKED_RADIATOR: f64 = 0.15;
+/// degC at which the thermostat begins to open, and at which it is open.
+const THERMOSTAT: (f64, f64) = (80.0, 92.0);
+/// kW/K between coolant and air that the radiator takes away, clear and blocked.
+const RADIATOR: f64 = 1.5;
+const BLOCKED_RADIATOR: f64 = 0.075;
 /// degC from which the coolant boils, and kW/K that go with the steam.
 const BOILS_DEGC: f64 = 112.0;
 const STEAM: f64 = 4.0;
@@ -267,7 +268,9 @@ impl Engine {
         let radiator = if self.wear.radiator_blocked { BLOCKED_RADIATOR } else { RADIATOR };
         let circulating =
             if self.is_running() { (self.coolant_level / CIRCULATES).clamp(0.05, 1.0) } else { 0.0 };
-        let cooled = radiator * circulating * (self.coolant - THERMOSTAT_DEGC).max(0.0);
+        let (begins, is_open) = THERMOSTAT;
+        let open = ((self.coolant - begins) / (is_open - begins)).clamp(0.0, 1.0);
+        let cooled = radiator * circulating * open * (self.coolant - inputs.ambient).max(0.0);
         let steam = STEAM * (self.coolant - BOILS_DEGC).max(0.0);
         let casing = 0.03 * (self.coolant - inputs.ambient);
         self.coolant += (combustion + heater - cooled - steam - casing) * dt / HEAT_CAPACITY;
@@ -388,6 +391,20 @@ mod tests {
         let hot = engine.coolant;
         run(&mut engine, &REST, 60.0);
         assert!(engine.coolant < hot && engine.coolant > hot - 5.0, "{}", engine.coolant);
+    }
+
+    #[test]
+    fn the_thermostat_holds_it_until_the_air_is_too_hot() {
+        let coolant = |ambient, load| {
+            let mut engine = running();
+            run(&mut engine, &Inputs { ambient, ..under(load) }, 2400.0);
+            engine.coolant
+        };
+        let [winter, summer, desert] = [-20.0, 35.0, 65.0].map(|air| coolant(air, 80.0));
+        assert!((82.0..90.0).contains(&winter), "{winter}");
+        assert!((86.0..95.0).contains(&summer) && summer > winter + 2.0, "{summer} {winter}");
+        assert!((95.0..104.0).contains(&desert), "{desert}");
+        assert!(coolant(65.0, 100.0) > desert + 5.0);
     }
 
     #[test]

@@ -76,7 +76,7 @@ impl Governor {
         let ripple = 1.2 * random.noise();
         match self.fault {
             Fault::RunningAway => RUNAWAY_RPM,
-            _ if rated < RATED_RPM => rated + self.swing(),
+            _ if rated < RATED_RPM => rated + self.swing() + ripple,
             _ => {
                 let settled = self.set_point().settles_at(rated, load / RATED_KW);
                 settled - dip * (load - self.answered) / RATED_KW + ripple

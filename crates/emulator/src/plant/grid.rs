@@ -8,10 +8,14 @@ const NOMINAL_FREQUENCY: f64 = 50.0;
 /// Part of its voltage that a sag leaves, and that a swell makes of it: beyond every usual limit.
 const SAG: f64 = 0.72;
 const SWELL: f64 = 1.18;
-/// Below this part a meter sees neither voltage nor frequency.
+/// Below this part of its voltage a phase is as good as dead.
 const UNSEEN: f64 = 0.02;
+/// V below which a meter finds no frequency.
+const NO_FREQUENCY: f64 = 15.0;
 /// V below which a phase feeds nobody.
 pub(super) const DEAD_PHASE: f64 = 50.0;
+/// V from which all phases are beyond that, however they wander.
+const ALIVE: f64 = 53.0;
 /// Hz a second at which the grid drifts to another frequency.
 const DRIFT: f64 = 0.5;
 
@@ -84,10 +88,7 @@ impl Grid {
 
     /// Whether it can feed anybody.
     pub(super) fn is_alive(&self) -> bool {
-        let supplied = self
-            .supply
-            .is_none_or(|supply| supply.parts.iter().sum::<f64>() / 3.0 * NOMINAL_VOLTAGE > DEAD_PHASE);
-        supplied && !self.outage && self.condition != Condition::Failed && self.level > DEAD_PHASE
+        !self.outage && self.parts().iter().any(|part| part * self.level > ALIVE)
     }
 
     pub(super) fn is_reversed(&self) -> bool {
@@ -127,31 +128,38 @@ impl Grid {
             }
             .max(0.0);
         }
-        let seen = voltage.iter().any(|volts| *volts > UNSEEN * NOMINAL_VOLTAGE);
-        (voltage, if seen { self.hertz } else { 0.0 })
+        (voltage, found(voltage, self.hertz))
     }
 
     /// Part of its voltage that each phase is to have.
     fn remains(&mut self, dt: f64, random: &mut Random) -> [f64; 3] {
-        let supplied = self.supply.map_or([1.0; 3], |supply| supply.parts);
-        let own = self.own_remains(dt, random);
-        std::array::from_fn(|phase| own[phase] * supplied[phase])
-    }
-
-    /// The same, of the line itself.
-    fn own_remains(&mut self, dt: f64, random: &mut Random) -> [f64; 3] {
         if self.outage {
             return [0.0; 3];
         }
-        match self.condition {
-            Condition::Normal | Condition::Reversed => [1.0; 3],
-            Condition::Failed => [0.0; 3],
-            Condition::Sagging => [SAG; 3],
-            Condition::Swelling => [SWELL; 3],
-            Condition::Lost(lost) => std::array::from_fn(|phase| if phase == lost { 0.0 } else { 1.0 }),
-            Condition::Flickering => [self.flicker.step(dt, random); 3],
+        if self.condition == Condition::Flickering {
+            self.flicker.step(dt, random);
         }
+        self.parts()
     }
+
+    /// What the line's condition and what feeds it leave of the voltage of each phase.
+    fn parts(&self) -> [f64; 3] {
+        let own = |phase| match self.condition {
+            Condition::Normal | Condition::Reversed => 1.0,
+            Condition::Failed => 0.0,
+            Condition::Sagging => SAG,
+            Condition::Swelling => SWELL,
+            Condition::Lost(lost) => f64::from(u8::from(phase != lost)),
+            Condition::Flickering => self.flicker.part,
+        };
+        let supplied = self.supply.map_or([1.0; 3], |supply| supply.parts);
+        std::array::from_fn(|phase| own(phase) * supplied[phase])
+    }
+}
+
+/// The frequency that a meter finds at these voltages.
+pub(super) fn found(voltage: [f64; 3], hertz: f64) -> f64 {
+    if voltage.iter().any(|volts| *volts > NO_FREQUENCY) { hertz } else { 0.0 }
 }
 
 /// Dips that come and go.
@@ -166,8 +174,7 @@ impl Flicker {
         Self { part: 1.0, left: 0.0 }
     }
 
-    /// Part of the voltage that is there.
-    fn step(&mut self, dt: f64, random: &mut Random) -> f64 {
+    fn step(&mut self, dt: f64, random: &mut Random) {
         self.left -= dt;
         if self.left <= 0.0 {
             (self.part, self.left) = match self.part {
@@ -175,7 +182,6 @@ impl Flicker {
                 _ => (1.0, random.between(1.0, 6.0)),
             };
         }
-        self.part
     }
 }
 

@@ -55,7 +55,7 @@ pub(crate) const LEVERS: &[Lever] = &[
             Word::new("varies", "Consumers come and go"),
             Word::new("daily", "The curve of a working day, from ten in the morning on"),
         ],
-        (0.0, 150.0),
+        (0.0, 200.0),
         "kW",
     ),
     Lever::of_numbers(

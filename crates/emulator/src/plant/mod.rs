@@ -44,7 +44,7 @@ use climate::Climate;
 use engine::Inputs;
 use governor::Fault;
 use grid::{DEAD_PHASE, Grid};
-use load::{Load, NO_LOAD, PhaseLoads};
+use load::{Load, NO_LOAD, PhaseLoads, tenth};
 use parallel::{Coupling, Set, live_average};
 use senders::Senders;
 use sisters::Feeding;
@@ -207,7 +207,12 @@ impl Plant {
 
     /// Whether genset and grid feed one busbar.
     pub(crate) fn is_parallel(&self) -> bool {
-        self.mains_breaker.closed && self.genset_breaker.closed && self.grid.is_alive()
+        self.is_joined() && self.grid.is_alive()
+    }
+
+    /// Whether genset and line are on one busbar, whatever the grid gives.
+    fn is_joined(&self) -> bool {
+        self.mains_breaker.closed && self.genset_breaker.closed
     }
 
     /// By how many degrees the genset leads the mains, -180 to 180; without meaning while one of them is dead.
@@ -217,14 +222,18 @@ impl Plant {
 
     /// How the genset stands to the mains.
     pub(crate) fn synchronism(&self) -> Synchronism {
-        let (mains, genset) = (&self.mains, &self.genset);
-        let (mains_volts, genset_volts) = (mains.average_voltage(), genset.average_voltage());
+        let mains = &self.mains;
+        self.stand((mains.average_voltage(), mains.frequency), !mains.phase_order_wrong)
+    }
+
+    fn stand(&self, (volts, hertz): (f64, f64), same_order: bool) -> Synchronism {
+        let own = self.genset.average_voltage();
         Synchronism {
-            live: mains_volts.min(genset_volts) > alternator::DEAD,
+            live: volts.min(own) > alternator::DEAD,
             angle: self.angle(),
-            slip: genset.frequency - mains.frequency,
-            voltage: genset_volts - mains_volts,
-            same_order: !mains.phase_order_wrong,
+            slip: self.genset.frequency - hertz,
+            voltage: own - volts,
+            same_order,
         }
     }
 
@@ -240,27 +249,42 @@ impl Plant {
 
     /// `speed` is that of the shaft before the engine had its say.
     fn electricity(&mut self, dt: f64, speed: f64) {
-        self.alternator.step(dt, self.engine.speed, &self.excitation, &self.genset);
-        let (voltage, frequency) = self.grid.step(dt, self.mains.total_active(), &mut self.random);
-        if self.coupling.meet(dt, self.is_parallel(), &self.synchronism()) {
+        let chokes = self.is_joined() && !self.grid.is_alive();
+        self.alternator.step(dt, self.engine.speed, &self.excitation, &self.genset, chokes);
+        let (grid, hertz) = self.grid.step(dt, self.mains.total_active(), &mut self.random);
+        let stand = self.stand((live_average(grid), self.grid.hertz()), !self.grid.is_reversed());
+        if self.coupling.meet(dt, self.is_parallel(), &stand) {
             self.genset_breaker.trip();
         }
         let parallel = self.is_parallel();
         if parallel {
-            self.drag(dt, speed, voltage, frequency);
+            self.drag(dt, speed, grid, hertz);
         }
-        let terminals = self.terminals(parallel.then_some(voltage));
-        let (mains_load, genset_load) = self.flows(dt, parallel, (voltage, frequency), terminals);
+        let genset_hertz = self.engine.speed * HERTZ_PER_RPM;
+        let terminals = self.terminals(parallel.then_some(grid));
+        // Whatever is on one busbar has one voltage.
+        let (voltage, frequency) = match self.is_joined() {
+            true if !parallel => (terminals, grid::found(terminals, genset_hertz)),
+            true => (terminals, hertz),
+            false => (grid, hertz),
+        };
+        let dead = grid.map(|volts| self.is_joined() && !(parallel && volts >= DEAD_PHASE));
+        let line = parallel::dead_line(terminals, dead);
+        let (mains_load, genset_load) = self.flows(dt, parallel, (grid, hertz), terminals);
 
-        let phase_order_wrong = self.grid.is_reversed();
-        self.mains =
-            Feed { voltage, frequency, phase_order_wrong, active: mains_load.0, reactive: mains_load.1 };
+        self.mains = Feed {
+            voltage,
+            frequency,
+            phase_order_wrong: self.grid.is_reversed() && self.grid.is_alive(),
+            active: both(mains_load.0, line.0.map(|kw| -kw)),
+            reactive: both(mains_load.1, line.1.map(|kvar| -kvar)),
+        };
         self.mains_energy.add(&self.mains, dt);
         self.genset = Feed {
             voltage: terminals,
-            frequency: self.engine.speed * HERTZ_PER_RPM,
-            active: genset_load.0,
-            reactive: genset_load.1,
+            frequency: genset_hertz,
+            active: both(genset_load.0, line.0),
+            reactive: both(genset_load.1, line.1),
             ..Feed::default()
         };
         self.genset_energy.add(&self.genset, dt);
@@ -274,15 +298,16 @@ impl Plant {
         self.alternator.voltage = live_average(voltage);
     }
 
-    /// V of each phase at the genset's terminals, with those of the grid where it is on the same busbar.
+    /// V of each phase at the genset's terminals: those of the grid where it is on the same busbar, and next to nothing
+    /// on a phase that it has lost.
     fn terminals(&mut self, grid: Option<[f64; 3]>) -> [f64; 3] {
         let alternator = self.alternator.voltage;
         let ripple = 0.0006 * alternator;
         let mut terminals =
             [0.9985, 1.0008, 1.0007].map(|part| part * alternator + ripple * self.random.noise());
         if let Some(grid) = grid {
-            for (own, grid) in terminals.iter_mut().zip(grid).filter(|(_, grid)| *grid >= DEAD_PHASE) {
-                *own = grid;
+            for (own, grid) in terminals.iter_mut().zip(grid) {
+                *own = if grid >= DEAD_PHASE { grid } else { grid.max(alternator::CHOKED * *own) };
             }
         }
         terminals
@@ -327,6 +352,10 @@ impl Plant {
             _ => (NO_LOAD, NO_LOAD),
         }
     }
+}
+
+fn both(one: [f64; 3], other: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|phase| tenth(one[phase] + other[phase]))
 }
 
 fn past_energy(active: f64) -> Energy {

@@ -19,8 +19,14 @@ const SLIP_WINDOW: f64 = 0.6;
 const VOLTAGE_WINDOW: f64 = 25.0;
 /// Seconds of a jolt until the genset breaker's own release has opened it.
 const RELEASE: f64 = 0.2;
-/// Times the rated power that flows between two sources in opposition.
+/// Times the rated power that a source of full voltage sends into one of none.
 const SURGE: f64 = 3.0;
+/// Times the rated current that a dead line draws, with all that hangs on it, and the parts of it that are active and
+/// reactive power.
+const LINE_DRAWS: f64 = 2.5;
+const LINE_PARTS: (f64, f64) = (0.5, 0.87);
+/// V below which nothing to speak of flows into it.
+const LEAST_VOLTAGE: f64 = 5.0;
 
 /// How the genset stands to the mains.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,6 +52,23 @@ impl Synchronism {
             && self.slip.abs() <= SLIP_WINDOW
             && self.voltage.abs() <= VOLTAGE_WINDOW
     }
+
+    /// Part of the other's voltage that the genset sets against it: nothing of use where it turns the other way round.
+    fn against(&self) -> f64 {
+        match self.live && self.same_order {
+            true => 1.0 + self.voltage / RATED_VOLTAGE,
+            false => 0.0,
+        }
+    }
+}
+
+/// What a line that its grid has left draws from a genset that still feeds it, by the voltage of its dead phases.
+pub(super) fn dead_line(volts: [f64; 3], dead: [bool; 3]) -> PhaseLoads {
+    let kva: [f64; 3] = std::array::from_fn(|n| match dead[n] && volts[n] > LEAST_VOLTAGE {
+        true => LINE_DRAWS * RATED_KVA / 3.0 * volts[n] / RATED_VOLTAGE,
+        false => 0.0,
+    });
+    (kva.map(|kva| tenth(LINE_PARTS.0 * kva)), kva.map(|kva| tenth(LINE_PARTS.1 * kva)))
 }
 
 /// How genset and grid are tied together.
@@ -63,6 +86,8 @@ enum Tie {
 pub(super) struct Coupling {
     tie: Tie,
     angle: f64,
+    /// Part of the grid's voltage that the genset sets against it in a jolt.
+    against: f64,
     /// kW and kvar of the genset.
     active: f64,
     reactive: f64,
@@ -80,20 +105,20 @@ impl Coupling {
     }
 
     /// Joins them, or takes them apart. True when the genset breaker's release opens.
-    pub(super) fn meet(&mut self, dt: f64, joined: bool, synchronism: &Synchronism) -> bool {
-        let mut releases = false;
+    pub(super) fn meet(&mut self, dt: f64, joined: bool, stand: &Synchronism) -> bool {
+        let released = matches!(self.tie, Tie::Jolting(left) if left <= 1.5 * dt);
         self.tie = match (joined, self.tie) {
             (false, _) => Tie::Apart,
-            (true, Tie::Apart) if synchronism.is_safe() => Tie::Together,
-            (true, Tie::Apart) => Tie::Jolting(RELEASE),
-            (true, Tie::Jolting(left)) if left > 1.5 * dt => Tie::Jolting(left - dt),
-            (true, Tie::Jolting(_)) => {
-                releases = true;
-                Tie::Together
+            (true, Tie::Jolting(left)) if !released => Tie::Jolting(left - dt),
+            // Where the release cannot open, the stronger has dragged the other into step by now, if there is one.
+            (true, Tie::Jolting(_) | Tie::Together) if stand.same_order => Tie::Together,
+            (true, Tie::Apart) if stand.is_safe() => Tie::Together,
+            (true, _) => {
+                self.against = stand.against();
+                Tie::Jolting(RELEASE)
             }
-            (true, Tie::Together) => Tie::Together,
         };
-        releases
+        joined && released
     }
 
     /// What the mains and the genset carry of a load when both feed it: the genset what its set points ask for, the
@@ -107,9 +132,9 @@ impl Coupling {
     ) -> (PhaseLoads, PhaseLoads) {
         let (volts, hertz) = grid;
         if self.is_jolting() {
-            let angle = self.angle.to_radians();
-            self.active = SURGE * RATED_KW * angle.sin();
-            self.reactive = SURGE * RATED_KVA * (1.0 - angle.cos()) + 0.5 * RATED_KVAR;
+            let (sine, cosine) = self.angle.to_radians().sin_cos();
+            self.active = SURGE * RATED_KVA * self.against * sine;
+            self.reactive = SURGE * RATED_KVA * (self.against * cosine - 1.0);
         } else {
             approach(&mut self.active, genset.active(hertz), FOLLOWING, dt);
             approach(&mut self.reactive, genset.reactive(live_average(volts)), FOLLOWING, dt);

@@ -9,6 +9,7 @@ mod fleet;
 mod golden;
 mod hat821si;
 mod identities;
+mod laws;
 mod levers;
 #[cfg(target_os = "linux")]
 mod lines;

@@ -136,6 +136,20 @@ fn a_voltage_regulator_gives_nothing_or_too_much() {
 }
 
 #[test]
+fn more_current_than_the_exciter_can_force_sinks_the_voltage() {
+    let volts = |kw| {
+        let (mut plant, controls) = on_load(3);
+        pull(&mut plant, "load.power_factor", "0.5");
+        pull(&mut plant, "load", kw);
+        run(&mut plant, &controls, 1.0);
+        assert!(plant.engine.is_running());
+        plant.genset.average_voltage()
+    };
+    assert!(volts("70") > 205.0);
+    assert!((100.0..180.0).contains(&volts("130")), "{}", volts("130"));
+}
+
+#[test]
 fn an_overload_pulls_the_speed_down_and_in_the_end_stalls_the_engine() {
     let (mut plant, controls) = on_load(3);
     pull(&mut plant, "load", "97");

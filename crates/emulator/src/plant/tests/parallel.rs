@@ -177,10 +177,85 @@ fn a_lost_excitation_takes_reactive_power_from_the_grid() {
 }
 
 #[test]
-fn a_phase_that_the_grid_has_lost_is_the_gensets() {
-    let (mut plant, controls) = paralleled();
+fn a_line_that_its_grid_has_left_chokes_the_genset_until_they_part() {
+    for stuck in [false, true] {
+        let (mut plant, mut controls) = paralleled();
+        plant.engine.governor.trim += 30.0;
+        run(&mut plant, &controls, 5.0);
+        if stuck {
+            pull(&mut plant, "breaker.mains", "will_not_open");
+        }
+        pull(&mut plant, "mains", "failed");
+        for _ in 0..8 {
+            run(&mut plant, &controls, DT);
+            assert_eq!(plant.mains.voltage, plant.genset.voltage, "one busbar has one voltage");
+        }
+        assert!((5.0..15.0).contains(&plant.mains.voltage[0]), "{:?}", plant.mains);
+        assert!(plant.genset.average_current() > 300.0 && plant.mains.total_active() < 0.0);
+        assert_eq!(plant.genset.total_active(), -plant.mains.total_active());
+        controls.mains_breaker = false;
+        run(&mut plant, &controls, 4.0);
+        assert_eq!(genset_healthy(&plant), !stuck, "{:?}", plant.genset);
+        assert_eq!(plant.mains.voltage == [0.0; 3], !stuck);
+        assert_eq!(plant.genset.total_active() > 25.0, !stuck);
+    }
+}
+
+#[test]
+fn a_phase_that_the_grid_has_lost_is_dead_on_the_whole_busbar() {
+    let (mut plant, mut controls) = paralleled();
     pull(&mut plant, "mains", "l3_lost");
     run(&mut plant, &controls, 2.0);
-    assert_eq!((plant.mains.voltage[2], plant.mains.active[2]), (0.0, 0.0));
-    assert!(plant.genset.voltage[2] > 200.0 && plant.genset.active[2] > 8.0, "{:?}", plant.genset);
+    assert_eq!(plant.mains.voltage, plant.genset.voltage);
+    assert!(plant.genset.voltage[2] < 15.0 && plant.genset.voltage[0] > 220.0, "{:?}", plant.genset);
+    assert!(plant.genset.current()[2] > 300.0 && plant.mains.active[2] < 0.0);
+    controls.mains_breaker = false;
+    run(&mut plant, &controls, 2.0);
+    assert!(genset_healthy(&plant) && plant.genset.active[2] > 8.0, "{:?}", plant.genset);
+}
+
+#[test]
+fn a_jolt_draws_what_the_two_voltages_and_their_angle_make_of_it() {
+    /// kW and kvar of the genset in the step in which it is joined.
+    fn jolt(angle: f64, prepare: impl Fn(&mut Plant)) -> (f64, f64) {
+        let mut plant = Plant::new(3);
+        let mut controls = start(&mut plant);
+        plant.engine.governor.trim = 24.0;
+        prepare(&mut plant);
+        run(&mut plant, &controls, 5.0);
+        for _ in 0..200 {
+            if (plant.angle() - angle).abs() < 20.0 {
+                break;
+            }
+            run(&mut plant, &controls, DT);
+        }
+        controls.genset_breaker = true;
+        assert_eq!(run(&mut plant, &controls, 0.2), 1);
+        (plant.genset.total_active(), plant.genset.total_reactive())
+    }
+    let (active, reactive) = jolt(75.0, |_| {});
+    assert!(active > 150.0 && reactive < 0.0, "who leads gives: {active} {reactive}");
+    let (active, reactive) = jolt(-130.0, |_| {});
+    assert!(active < -100.0 && reactive < -200.0, "who lags takes: {active} {reactive}");
+    let (active, reactive) = jolt(0.0, |plant| pull(plant, "mains", "reversed"));
+    assert_eq!((active, (reactive / 10.0).round()), (0.0, -30.0), "three phases, three angles");
+    let (active, reactive) = jolt(0.0, |plant| pull(plant, "avr", "failed"));
+    assert_eq!((active, (reactive / 10.0).round()), (0.0, -30.0), "a dead one is magnetised by the grid");
+}
+
+#[test]
+fn phases_that_change_places_part_what_is_joined() {
+    for stuck in [false, true] {
+        let (mut plant, controls) = paralleled();
+        if stuck {
+            pull(&mut plant, "breaker.genset", "will_not_open");
+        }
+        pull(&mut plant, "mains", "reversed");
+        assert_eq!(run(&mut plant, &controls, 3.0), 1);
+        assert_eq!(plant.genset_breaker.tripped, !stuck);
+        assert_eq!(plant.is_jolting(), stuck, "nothing drags the one into the other's order");
+        pull(&mut plant, "mains", "normal");
+        run(&mut plant, &controls, 1.0);
+        assert!(!plant.is_jolting());
+    }
 }

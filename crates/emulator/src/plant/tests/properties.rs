@@ -163,6 +163,9 @@ fn step_is_lawful(plant: &mut Plant, controls: &Controls) -> Result<(), TestCase
     is_plausible(plant)?;
     feed_is_lawful(&plant.mains, plant.mains_breaker.closed)?;
     feed_is_lawful(&plant.genset, plant.genset_breaker.closed)?;
+    if plant.mains_breaker.closed && plant.genset_breaker.closed {
+        prop_assert_eq!(plant.mains.voltage, plant.genset.voltage, "one busbar has one voltage");
+    }
     prop_assert!((plant.genset.frequency - plant.engine.speed * HERTZ_PER_RPM).abs() < 1e-9);
     prop_assert!(plant.genset.frequency > 0.0 || plant.genset.voltage == [0.0; 3] || plant.is_parallel());
 
