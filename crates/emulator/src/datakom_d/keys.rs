@@ -86,8 +86,10 @@ impl DatakomD {
             (true, false) => Press::Long,
             (false, false) => Press::Short,
         };
-        // Whoever touches the front has heard the horn.
-        self.alarms.mute();
+        if (0..=DOWN).any(pressed) {
+            // Whoever touches the front has heard the horn.
+            self.alarms.mute();
+        }
         if pressed(0) {
             return self.press_stop();
         }
@@ -111,14 +113,27 @@ impl DatakomD {
                 self.run_wanted = true;
             }
             (1, Front::ManualAndRun) => {
-                // The mode changes, a running engine goes on running.
-                let running = self.readings.running;
-                self.enter(Mode::Run);
-                self.run_wanted |= running;
+                // The mode changes, and nothing else: a running engine goes on running, with the load that it has.
+                let (running, source) = (self.readings.running, self.feeding());
+                if self.enter(Mode::Run) {
+                    (self.run_wanted, self.source) = (running, source);
+                }
             }
-            (2, _) => self.enter(Mode::Auto),
-            (3, _) => self.enter(Mode::Test),
+            (2, _) => {
+                self.enter(Mode::Auto);
+            }
+            (3, _) => {
+                self.enter(Mode::Test);
+            }
             _ => {}
+        }
+    }
+
+    /// What feeds the load now, as far as the genset has to do with it.
+    fn feeding(&self) -> Source {
+        match self.sequence.operation().carries_load() {
+            true => self.demand().source,
+            false => Source::Mains,
         }
     }
 
@@ -163,11 +178,14 @@ impl DatakomD {
         self.alarms.reset();
     }
 
-    fn enter(&mut self, mode: Mode) {
-        if mode != self.mode {
+    /// Changes the mode; false where it is the one already.
+    fn enter(&mut self, mode: Mode) -> bool {
+        let changes = mode != self.mode;
+        if changes {
             self.mode = mode;
             self.run_wanted = false;
             self.source = Source::Mains;
         }
+        changes
     }
 }

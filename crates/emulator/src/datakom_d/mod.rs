@@ -155,6 +155,8 @@ impl DatakomD {
             operation: self.sequence.operation(),
         };
         match self.mode {
+            // A mains breaker that was opened by hand stays open.
+            Mode::Run if self.alarms.trip().is_some() => Demand { engine: false, source: self.source },
             _ if self.alarms.trip().is_some() => Demand::REST,
             Mode::Stop => Demand::REST,
             Mode::Run => {
@@ -240,6 +242,7 @@ impl DatakomD {
     fn act(&mut self, dt: Duration) {
         if let Some(trip) = self.alarms.trip() {
             self.sequence.trip(trip);
+            self.forget_wishes();
         }
         let (demand, sensed) = (self.demand(), self.sensed());
         self.sequence.step(dt, demand, sensed);
@@ -250,6 +253,14 @@ impl DatakomD {
             fuel_pump: self.fuel_pump,
             ..self.sequence.controls(demand, sensed)
         };
+    }
+
+    /// What was asked for by hand is not done later by itself, when the alarm that forbade it has been reset.
+    fn forget_wishes(&mut self) {
+        self.run_wanted = false;
+        if self.source != Source::Nothing {
+            self.source = Source::Mains;
+        }
     }
 
     /// Switches the heater, the pump and the consumers, each with its hysteresis.
