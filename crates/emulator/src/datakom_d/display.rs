@@ -299,8 +299,10 @@ impl Page<'_> {
         self.canvas.text(3, 0, &format!("MAC {mac}"));
         let imei = String::from_utf8_lossy(&identity.imei);
         self.canvas.text(4, 0, &format!("IMEI {}", imei.trim_end_matches('\0')));
-        self.row(5, "Lat", 10594, 0, "");
-        self.row(6, "Lon", 10596, 0, "");
+        for (line, axis, address) in [(5, "Lat", 10594), (6, "Lon", 10596)] {
+            self.canvas.text(line, 0, axis);
+            self.canvas.text_right(line, &format!("{:.5}", self.number(address) / 100_000.0));
+        }
         self.row(7, "Alt", 10598, 0, "m");
     }
 

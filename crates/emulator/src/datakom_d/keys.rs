@@ -97,7 +97,9 @@ impl DatakomD {
             match key {
                 1..=4 => self.press_mode(key),
                 5 => {
-                    let ready = self.sequence.operation().is_up_to_speed() && self.genset_healthy();
+                    let ready = self.sequence.operation().is_up_to_speed()
+                        && self.genset_healthy()
+                        && !self.contacts.loading_inhibited;
                     self.press_breaker(Source::Genset, ready);
                 }
                 6 => self.press_breaker(Source::Mains, self.mains.is_healthy()),
