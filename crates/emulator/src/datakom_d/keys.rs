@@ -151,8 +151,14 @@ impl DatakomD {
         if self.mode != Mode::Run {
             return;
         }
-        if self.source == own {
-            self.source = Source::Nothing;
+        let (genset, mains) = (self.controls.genset_breaker, self.controls.mains_breaker);
+        let (driven, left) = match own {
+            Source::Genset => (genset, if mains { Source::Mains } else { Source::Nothing }),
+            _ => (mains, if genset { Source::Genset } else { Source::Nothing }),
+        };
+        // One that is on its way turns round.
+        if driven || ready && self.source == own {
+            self.source = left;
         } else if ready {
             self.source = own;
         }

@@ -100,6 +100,25 @@ fn a_breaker_key_opens_its_own_breaker_and_leaves_the_other_open() {
 }
 
 #[test]
+fn a_breaker_that_closed_by_itself_is_opened_by_its_key() {
+    let mut site = Site::quiet();
+    let closed = |site: &Site| (site.codes("onboard_inputs")[0], site.codes("onboard_inputs")[1]);
+    site.press(RUN);
+    site.walk_to(8);
+    site.device.pull("mains", "failed").unwrap();
+    site.walk_to(13);
+    site.press(MCB);
+    site.pass_seconds(5);
+    assert_eq!(closed(&site), (1, 0), "the key of dead mains is dead");
+    site.press(GCB);
+    assert_eq!(site.walk_to(8), [13, 8]);
+    site.pass_seconds(10);
+    assert_eq!((site.code("operation_status"), closed(&site)), (8, (0, 0)));
+    site.press(GCB);
+    assert_eq!(site.walk_to(13), [&[8][..], &TAKE_LOAD].concat());
+}
+
+#[test]
 fn a_transfer_that_is_no_longer_wanted_turns_round() {
     let mut site = Site::quiet();
     site.press(RUN);
