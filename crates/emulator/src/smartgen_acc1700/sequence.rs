@@ -216,6 +216,7 @@ impl Sequence {
     }
 
     fn waits(&self, sensed: Sensed, setup: &Setup) -> bool {
+            heater: false,
         self.status == Status::Cooling
             && self.waited < setup.stop_pressure_time
             && sensed.pressure.is_some_and(|pressure| pressure > setup.stop_pressure)

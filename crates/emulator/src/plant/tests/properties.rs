@@ -271,8 +271,14 @@ fn happen_to_air(plant: &mut Compressor, orders: &mut Orders, what: &Happening) 
         }
         Happening::Outputs(bits) => {
             let on = |bit: u8| bits >> bit & 1 == 1;
-            *orders =
-                Orders { fuel: on(0), starter: on(1), idle: on(2), load_valve: on(5), blow_down: on(4) };
+            *orders = Orders {
+                fuel: on(0),
+                starter: on(1),
+                idle: on(2),
+                heater: on(3),
+                blow_down: on(4),
+                load_valve: on(5),
+            };
         }
         Happening::Trim(_) => {}
     }

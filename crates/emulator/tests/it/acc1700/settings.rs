@@ -210,3 +210,31 @@ fn manual_heating_is_for_a_unit_at_rest_and_ends_by_itself() {
     site.pass_seconds(1);
     assert!(!heats(&site), "the menu does not offer it to a unit that starts");
 }
+
+    let mut site = quiet();
+    for end in ["stop", "emergency_stop"] {
+        pull(&mut site, "heating", "on");
+        site.pass_seconds(5);
+        assert!(heats(&site));
+        match end {
+            "stop" => press(&mut site, STOP),
+            _ => pull(&mut site, end, "pressed"),
+        }
+        site.pass(TENTH);
+        assert!(!heats(&site), "{end}");
+    }
+    pull(&mut site, "heating", "on");
+    site.pass(TENTH);
+    assert!(!heats(&site), "not while a shutdown stands");
+}
+
+#[test]
+fn manual_heating_warms_the_engine() {
+    let warmed = |heating: &str| {
+        let mut site = set(&[("heating_time", "3600")]);
+        pull(&mut site, "ambient", "-20");
+        pull(&mut site, "heating", heating);
+        site.pass_seconds(1800);
+        site.number("engine_temperature")
+    };
+    assert!(warmed("on") > warmed("off") + 12.0);
