@@ -26,7 +26,7 @@ const OPEN_CIRCUIT: f64 = 6553.5;
 /// Stores all of them.
 pub(super) fn registers(unit: &Acc1700, bank: &mut Bank) {
     counters(unit, bank);
-    // These follow what the countdowns and then the alarm words show, pinned or not.
+    // These and the engine's fault follow what the countdowns and then the alarm words show, pinned or not.
     alarms(unit, bank);
     common_status(unit, bank);
     inputs_and_outputs(unit, bank);
@@ -101,8 +101,9 @@ fn indicators(unit: &Acc1700, bank: &mut Bank) {
 }
 
 fn engine_indicators(unit: &Acc1700, bank: &mut Bank) {
-    let filter = unit.ecu.as_ref().map(Ecu::shown).unwrap_or_default();
-    let engine_fault = [ECU_SHUTDOWN, ECU_WARNING].into_iter().any(|alarm| unit.alarms.is_active(alarm));
+    let filter = unit.ecu.as_ref().map(Ecu::filter).unwrap_or_default();
+    let said = |(register, bit): (u16, u16)| bank.bits_shown(register).contains(bit);
+    let engine_fault = said(ECU_SHUTDOWN) || said(ECU_WARNING);
     let mut engine = unit.alarms.word(FILTER_FAULT.0);
     engine.set(1, filter.waits);
     engine.set(2, filter.inhibited);

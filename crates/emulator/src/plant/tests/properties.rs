@@ -307,7 +307,7 @@ fn compressor_step_is_lawful(plant: &mut Compressor, orders: &Orders) -> Result<
         ("separator", plant.air.separator_loss, 0.0..400.0),
         ("delivery", plant.air.delivery, 0.0..16.0),
         ("consumption", plant.air.consumption, 0.0..14.001),
-        ("exhaust", plant.exhaust.temperature, -30.0..1150.0),
+        ("exhaust", plant.exhaust.temperature, -30.0..690.0),
         ("boost", plant.exhaust.boost, 0.0..350.0),
         ("soot", plant.filter.soot, 0.0..150.001),
         ("torque", plant.torque(), 0.0..125.001),

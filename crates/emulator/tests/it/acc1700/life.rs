@@ -340,7 +340,15 @@ fn maintenance_words_follow_their_countdowns() {
 }
 
 #[test]
-fn common_bits_follow_pinned_words() {
+fn the_engines_fault_and_common_bits_follow_pinned_words() {
+    for (word, bit, fault) in [
+        ("warning_alarms_1", "ecu_warning", true),
+        ("shutdown_alarms_1", "ecu_shutdown", true),
+        ("warning_alarms_1", "ncd_error", false),
+    ] {
+        let site = pinned(&[(word, bit)]);
+        assert_eq!(site.bits("engine_indicators").contains(9), fault, "{bit}");
+    }
     let site = pinned(&[("shutdown_alarms_4", "high_discharge_pressure_shutdown")]);
     assert_eq!([0, 1, 2].map(|bit| common(&site, bit)), [true, true, false]);
     let site = pinned(&[("indications_1", "0")]);
