@@ -277,6 +277,10 @@ impl Panel for Acc1700 {
             self.heating_left = Duration::ZERO;
         }
         self.valve.step(dt, self.demand(), &self.setup);
+        if !self.sequence.status().is_running() {
+            // What stands is not protected.
+            self.valve = LoadValve::default();
+        }
         if status != Status::Standby && self.sequence.status() == Status::Standby {
             self.note(1);
         }
