@@ -136,7 +136,8 @@ fn sensors(unit: &Acc1700, bank: &mut Bank) {
         match *sensor {
             Reading::Value(value) => bank.number(register, curve(value)),
             Reading::Broken => bank.number(register, open),
-            Reading::Absent => bank.absent(register),
+            // An open terminal, too.
+            Reading::Absent => bank.number(register, open),
         }
         // Whole units, as the register has them.
         measured(register + 1, *sensor, bank);

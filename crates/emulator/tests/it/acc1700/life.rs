@@ -95,7 +95,7 @@ fn plausible(point: &Point) -> RangeInclusive<f64> {
         ("ash_percentage", _) => 3.0..=30.0,
         ("battery_voltage", _) => 18.0..=29.0,
         ("charger_voltage", _) => 0.0..=29.0,
-        ("sensor_1_resistance", _) => 0.0..=0.0,
+        ("sensor_1_resistance", _) => 6553.5..=6553.5,
         (_, Some("ohm")) => 10.0..=200.0,
         ("sensor_5_current", _) => 4.0..=20.0,
         ("total_running_hours", _) => 900.0..=2700.0,

@@ -314,7 +314,7 @@ fn broken_sensors_have_a_code_of_their_own_and_open_terminals() {
         ("sender.separator", &[(59, 65535), (60, BROKEN)], &[]),
         (
             "sender.temperature",
-            &[(190, ABSENT), (57, 0), (58, ABSENT)],
+            &[(190, ABSENT), (57, 65535), (58, ABSENT)],
             &[(57, 65535), (58, BROKEN), (190, BROKEN)],
         ),
         ("sender.oil_pressure", &[(191, ABSENT)], &[(59, 65535), (60, BROKEN), (191, BROKEN)]),
