@@ -4,6 +4,9 @@ use crate::plant::Compressor;
 
 use super::Model;
 
+/// V from which a charge alternator is at work.
+const CHARGES: f64 = 10.0;
+
 /// One measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Reading {
@@ -94,15 +97,15 @@ impl Readings {
         sensor < self.of_the_engine
     }
 
-    /// Whether the engine is seen to turn, by anything that tells of it, at least as fast as these.
+    /// Whether the engine is seen to turn, by anything that tells of it, faster than these.
     pub(super) fn turns(&self, speed: f64, oil_pressure: f64) -> bool {
-        match (self.speed.value(), self.oil_pressure.value()) {
-            // A charge alternator at work gives more than its lamp.
-            (None, None) => self.charger > 10.0,
-            (rpm, kilopascal) => {
-                rpm.is_some_and(|rpm| rpm > speed) || kilopascal.is_some_and(|found| found > oil_pressure)
+        let oiled = self.oil_pressure.value().is_some_and(|found| found > oil_pressure);
+        oiled
+            || match self.speed.value().filter(|rpm| *rpm > 0.0) {
+                Some(rpm) => rpm > speed,
+                // No pulses: a charge alternator at work gives more than its lamp.
+                None => self.charger > CHARGES,
             }
-        }
     }
 }
 
