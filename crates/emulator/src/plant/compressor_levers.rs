@@ -135,17 +135,13 @@ impl Compressor {
             "dpf.soot" => Some(Position::Number(tenth(self.filter.soot))),
             "dpf.regeneration" => shown(&REGENERATIONS, self.filter.regeneration),
             "ambient" => held_or("normal", self.climate.held),
-            "sender.oil_pressure" => shown(&BREAKS, self.senders.oil_pressure),
-            "sender.temperature" => shown(&BREAKS, self.senders.temperature),
-            "sender.fuel_level" => shown(&BREAKS, self.senders.fuel_level),
             "sender.discharge_pressure" => shown(&BREAKS, discharge.pressure),
             "sender.discharge_temperature" => shown(&BREAKS, discharge.temperature),
             "sender.separator" => shown(&BREAKS, discharge.separator),
-            "pickup" => shown(&BREAKS, self.senders.pickup),
             "ecu" => shown(&SILENT, self.ecu_silent),
             "door" => shown(&DOORS, self.door_open),
             "emergency_stop" => shown(&PRESSES, self.emergency_stop),
-            _ => engine::lever(id, &self.engine, &self.tank, &self.battery),
+            _ => engine::lever(id, &self.engine, &self.tank, &self.battery, self.senders),
         }
     }
 
@@ -164,19 +160,15 @@ impl Compressor {
             "dpf.soot" => self.filter.soot = held(to).unwrap_or(self.filter.soot),
             "dpf.regeneration" => set(&REGENERATIONS, to, |how| self.filter.regeneration = how),
             "ambient" => self.climate.held = held(to),
-            "sender.oil_pressure" => set(&BREAKS, to, |broken| self.senders.oil_pressure = broken),
-            "sender.temperature" => set(&BREAKS, to, |broken| self.senders.temperature = broken),
-            "sender.fuel_level" => set(&BREAKS, to, |broken| self.senders.fuel_level = broken),
             "sender.discharge_pressure" => set(&BREAKS, to, |broken| discharge.pressure = broken),
             "sender.discharge_temperature" => set(&BREAKS, to, |broken| discharge.temperature = broken),
             "sender.separator" => set(&BREAKS, to, |broken| discharge.separator = broken),
-            "pickup" => set(&BREAKS, to, |broken| self.senders.pickup = broken),
             "ecu" => set(&SILENT, to, |silent| self.ecu_silent = silent),
             "door" => set(&DOORS, to, |open| self.door_open = open),
             "emergency_stop" => set(&PRESSES, to, |pressed| self.emergency_stop = pressed),
             _ => {
                 let batteries = std::slice::from_mut(&mut self.battery);
-                engine::pull(id, to, &mut self.engine, &mut self.tank, batteries);
+                engine::pull(id, to, &mut self.engine, &mut self.tank, batteries, &mut self.senders);
             }
         }
     }
