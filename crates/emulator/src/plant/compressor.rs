@@ -39,6 +39,8 @@ pub(crate) struct Discharge {
     pub(crate) pressure: Option<f64>,
     /// degC.
     pub(crate) temperature: Option<f64>,
+    /// Its wires touch, hence nothing.
+    pub(crate) temperature_shorted: bool,
     /// kPa lost across the oil separator.
     pub(crate) separator_loss: Option<f64>,
 }
@@ -47,8 +49,17 @@ pub(crate) struct Discharge {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct DischargeSenders {
     pub(super) pressure: bool,
-    pub(super) temperature: bool,
+    pub(super) temperature: Wires,
     pub(super) separator: bool,
+}
+
+/// The wires of a sender.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Wires {
+    #[default]
+    Whole,
+    Broken,
+    Shorted,
 }
 
 /// The whole of it; a panel reads the fields and hands back [`Orders`].
@@ -157,7 +168,8 @@ impl Compressor {
         let unless = |broken: bool, value: f64| (!broken).then_some(value);
         Discharge {
             pressure: unless(broken.pressure, air.pressure),
-            temperature: unless(broken.temperature, air.temperature),
+            temperature: unless(broken.temperature != Wires::Whole, air.temperature),
+            temperature_shorted: broken.temperature == Wires::Shorted,
             separator_loss: unless(broken.separator, air.separator_loss),
         }
     }

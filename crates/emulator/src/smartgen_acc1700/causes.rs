@@ -167,11 +167,13 @@ fn inputs(view: &View<'_>, take: &mut impl FnMut(Judgement)) {
     }
 }
 
-/// Open, high and low of each sensor: a shutdown, and 19 registers on a warning.
+/// Open, high and low of each sensor: a shutdown, and 19 registers on a warning. And the error of the fourth.
 fn sensors(view: &View<'_>, take: &mut impl FnMut(Judgement)) {
     const SHUTDOWNS: [(u16, u16); 5] = [(2, 8), (2, 12), (3, 0), (3, 4), (3, 8)];
     const WARNINGS_FROM: u16 = 19;
     let delay = view.setup.sensor_delay;
+    let shorted = view.readings.sensors[3] == Reading::Shorted;
+    take(Judgement { at: (22, 7), delay, verdict: when(shorted) });
     for (index, (sensor, setup)) in view.readings.sensors.iter().zip(&view.setup.sensors).enumerate() {
         let (register, bit) = SHUTDOWNS[index];
         // A sensor of the engine's has the engine's alarms.
@@ -209,7 +211,7 @@ pub(super) fn when(cause: bool) -> Verdict {
 fn low(reading: Reading, limit: f64, hysteresis: f64) -> Verdict {
     match reading {
         Reading::Value(value) => below(value, limit, hysteresis),
-        Reading::Broken => Verdict::Between,
+        Reading::Broken | Reading::Shorted => Verdict::Between,
         Reading::Absent => Verdict::Fine,
     }
 }

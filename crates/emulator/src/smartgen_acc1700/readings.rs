@@ -15,13 +15,15 @@ pub(super) enum Reading {
     Absent,
     /// The sensor's wire is broken.
     Broken,
+    /// The sensor's wires touch.
+    Shorted,
 }
 
 impl Reading {
     pub(super) fn value(self) -> Option<f64> {
         match self {
             Self::Value(value) => Some(value),
-            Self::Absent | Self::Broken => None,
+            Self::Absent | Self::Broken | Self::Shorted => None,
         }
     }
 }
@@ -65,7 +67,10 @@ impl Readings {
         };
         let fuel_level = wired(engine.fuel_level);
         let pressure = wired(discharge.pressure);
-        let temperature = wired(discharge.temperature);
+        let temperature = match discharge.temperature_shorted {
+            true => Reading::Shorted,
+            false => wired(discharge.temperature),
+        };
         let (speed, coolant, oil_pressure, first, second) = match model {
             Model::Acc1700 => {
                 let (coolant, oil) = (wired(engine.coolant), wired(oil_pressure));

@@ -136,6 +136,7 @@ fn sensors(unit: &Acc1700, bank: &mut Bank) {
         match *sensor {
             Reading::Value(value) => bank.number(register, curve(value)),
             Reading::Broken => bank.number(register, open),
+            Reading::Shorted => bank.number(register, 0.0),
             // An open terminal, too.
             Reading::Absent => bank.number(register, open),
         }
@@ -166,7 +167,7 @@ fn measured(register: u16, reading: Reading, bank: &mut Bank) {
     match reading {
         Reading::Value(value) => bank.number(register, value.round()),
         Reading::Absent => bank.absent(register),
-        Reading::Broken => bank.broken(register),
+        Reading::Broken | Reading::Shorted => bank.broken(register),
     }
 }
 

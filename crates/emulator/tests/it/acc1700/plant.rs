@@ -122,6 +122,7 @@ const ROWS: &[Row] = &[
     (Idle, &[], &[("sender.separator", "broken")], 5, &["aux_sensor_2_open_warning"]),
     (Idle, &[], &[("sender.fuel_level", "broken")], 5, &["aux_sensor_3_open_warning"]),
     (Idle, &[], &[("sender.discharge_temperature", "broken")], 5, &["aux_sensor_4_open_warning"]),
+    (Idle, &[], &[("sender.discharge_temperature", "shorted")], 5, &["aux_sensor_4_error"]),
     (Loaded, &[], &[("sender.discharge_pressure", "broken")], 5, &["aux_sensor_5_open_shutdown"]),
     (Idle, &[], &[("sender.temperature", "broken")], 5, &["ecu_warning"]),
     (Idle, &[], &[("sender.oil_pressure", "broken")], 5, &["ecu_warning"]),
@@ -296,6 +297,10 @@ fn broken_sensors_have_a_code_of_their_own_and_open_terminals() {
     };
     const BROKEN: u16 = 32767;
     const ABSENT: u16 = 32766;
+    let mut shorted = quiet();
+    pull(&mut shorted, "sender.discharge_temperature", "shorted");
+    shorted.pass(TENTH);
+    registers(&shorted, &[(63, 0), (64, BROKEN), (194, BROKEN)], "shorted");
     for (lever, can, plain) in [
         (
             "sender.fuel_level",
