@@ -54,6 +54,12 @@ scenarios! {
     compressor_day: "compressor-day.toml",
     compressor_hot_discharge: "compressor-hot-discharge.toml",
     compressor_locked: "compressor-locked.toml",
+    compressor_particle_filter: "compressor-particle-filter.toml",
+    compressor_filter_neglected: "compressor-filter-neglected.toml",
+    compressor_blow_down_blocked: "compressor-blow-down-blocked.toml",
+    compressor_cold_morning: "compressor-cold-morning.toml",
+    compressor_overloaded: "compressor-overloaded.toml",
+    compressor_will_not_stop: "compressor-will-not-stop.toml",
 }
 
 #[test]
