@@ -82,6 +82,7 @@ fn outputs(bits: u8) -> Controls {
         fuel_pump: on(4),
         genset_breaker: on(5),
         mains_breaker: on(6),
+        load_shedding: on(7),
     }
 }
 
