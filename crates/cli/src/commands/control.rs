@@ -22,6 +22,11 @@ pub(super) fn token() -> Result<Option<Token>, Failure> {
     }
 }
 
+/// Whether a control may be served there, which is asked before anything starts.
+pub(super) fn allow(address: SocketAddr, token: Option<&Token>) -> Result<(), Failure> {
+    control::may_listen(address, token).map_err(failure)
+}
+
 /// The control of what `busbar emulate` imitates.
 pub(super) async fn serve(
     address: SocketAddr,
@@ -36,8 +41,12 @@ pub(super) async fn serve(
         Imitated { id, name, controller: controller.clone() }
     });
     let control = Control { imitated: imitated.collect(), token, site: None };
-    control::serve(address, control).await.map_err(|error| match error {
+    control::serve(address, control).await.map_err(failure)
+}
+
+fn failure(error: ServeError) -> Failure {
+    match error {
         ServeError::NoToken { .. } => Failure::Call(format!("{error} in {TOKEN}")),
         _ => Failure::Failed(format!("{error} (--control ADDR:PORT)")),
-    })
+    }
 }

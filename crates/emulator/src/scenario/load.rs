@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
+use busbar_profile::text::shown;
 use busbar_profile::{DateTime, Findings, Profile, builtin, builtins, nearest};
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 use super::step::Stage;
-use super::text::shown;
 use super::values::{Entry, Notes, entries};
-use super::{Scenario, Step};
+use super::{Place, Scenario, Step};
 use crate::config::Config;
 use crate::device::Device;
 
@@ -26,7 +26,11 @@ pub(super) fn scenario(file: &str, text: &str) -> Result<Scenario, Findings> {
     for error in errors {
         let span = error.span().unwrap_or(0..0);
         let message = error.message().replace('\n', ", ");
-        notes.add(span.clone(), format!("this is not TOML: {message}"), syntax_help(text, span.start));
+        let help = match message.starts_with("duplicate key") {
+            true => "leave one of them; what happens twice takes two steps",
+            false => syntax_help(text, span.start),
+        };
+        notes.add(span, format!("this is not TOML: {message}"), help);
     }
     if !notes.is_clean() {
         // After a syntax error the rest of the text means who knows what.
@@ -63,7 +67,8 @@ fn read(file: &str, root: &DeTable<'_>, notes: &mut Notes<'_>) -> Option<Scenari
         return None;
     };
     let (mut scenario, probe) = self::head(file, &head, notes)?;
-    let Some(steps) = steps else {
+    let none = |entry: &Entry<'_, '_>| entry.value.get_ref().as_array().is_some_and(|steps| steps.is_empty());
+    let Some(steps) = steps.filter(|steps| !none(steps)) else {
         let help = "add [[steps]] with at = \"10s\" and what happens then, such as mains = \"failed\"";
         notes.add(head.span, "this scenario has no steps", help);
         return None;
@@ -77,11 +82,14 @@ fn head(file: &str, head: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<(Scen
     let mut scenario = nothing(file);
     let (mut controller, mut model, mut settings) = (None, None, None);
     let mut titled = false;
-    for entry in notes.table(head)? {
+    let Some(table) = head.value.get_ref().as_table() else {
+        return notes.wrong_type(head, "[scenario] above its keys, once");
+    };
+    for entry in entries(table) {
         match entry.key.as_str() {
             "title" => {
                 titled = true;
-                scenario.title = title(&entry, notes).unwrap_or_default();
+                scenario.title = notes.line(&entry, 100).unwrap_or_default();
             }
             "about" => scenario.about = notes.text(&entry),
             "controller" => controller = Some(entry),
@@ -101,6 +109,7 @@ fn head(file: &str, head: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<(Scen
         return None;
     };
     scenario.profile = profile(&controller, notes)?;
+    scenario.place = notes.place(controller.value.span().start);
     if let Some(entry) = &model {
         scenario.model = Some(notes.text(entry)?);
     }
@@ -149,7 +158,11 @@ fn profile(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<&'static Prof
 }
 
 fn clock(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<DateTime> {
-    let text = notes.text(entry)?;
+    let text = match entry.value.get_ref() {
+        // A date of TOML itself is as good.
+        DeValue::Datetime(date) => date.to_string(),
+        _ => notes.text(entry)?,
+    };
     let clock = text.parse().ok();
     if clock.is_none() {
         let help = "write a local time, such as \"2026-01-05T10:00:00\"";
@@ -158,28 +171,22 @@ fn clock(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<DateTime> {
     clock
 }
 
-fn title(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<String> {
-    let title = notes.text(entry)?;
-    let fits = (1..=100).contains(&title.trim().chars().count()) && !title.contains(char::is_control);
-    if !fits {
-        notes.add(entry.value.span(), "this is no title", "write 1 to 100 characters on one line");
-    }
-    fits.then(|| title.trim().to_owned())
-}
-
 fn steps(scenario: &Scenario, probe: Device, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Vec<Step> {
-    let tables = entry.value.get_ref().as_array();
-    let Some(tables) = tables.filter(|tables| !tables.is_empty()) else {
+    let Some(tables) = entry.value.get_ref().as_array() else {
         notes.wrong_type::<()>(entry, "a list of tables, each headed [[steps]]");
         return Vec::new();
     };
     let mut stage = Stage::new(scenario.profile, probe, scenario.clock, scenario.lasts);
     let mut steps = Vec::new();
     for item in tables.iter() {
+        if notes.is_full() {
+            break;
+        }
         match item.get_ref().as_table() {
             Some(table) => steps.extend(stage.step(table, item.span(), notes)),
             None => {
-                notes.wrong_type::<()>(entry, "a list of tables, each headed [[steps]]");
+                let entry = Entry { key: entry.key.clone(), span: item.span(), value: item };
+                notes.wrong_type::<()>(&entry, "a list of tables, each headed [[steps]]");
             }
         }
     }
@@ -191,6 +198,7 @@ fn nothing(file: &str) -> Scenario {
     let Config { seed, epoch, .. } = Config::default();
     Scenario {
         file: file.to_owned(),
+        place: Place { line: 1, column: 1 },
         title: String::new(),
         about: None,
         profile: &builtins()[0],

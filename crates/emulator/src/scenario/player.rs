@@ -4,13 +4,13 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use busbar_profile::DateTime;
+use busbar_profile::text::in_words;
 
 use super::condition::Condition;
 use super::expectation::Watch;
 use super::narrator::Narrator;
 use super::order::Order;
 use super::report::Seen;
-use super::text::in_words;
 use super::{Action, Check, CheckVerdict, Event, EventKind, Place, Report, Scenario, Step, Trigger};
 use crate::device::{Device, STEP};
 

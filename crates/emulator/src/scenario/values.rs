@@ -3,12 +3,15 @@
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
+use busbar_profile::text::{duration, in_words, shown};
 use busbar_profile::{Collector, Findings, nearest};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::Place;
-use super::text::{duration, in_words, shown};
+
+/// Who has mended these will be told the others.
+const MOST_FOUND: usize = 100;
 
 /// The text of a file and what was found wrong with it.
 pub(super) struct Notes<'a> {
@@ -16,7 +19,7 @@ pub(super) struct Notes<'a> {
     /// Where its lines begin.
     lines: Vec<usize>,
     findings: Collector<'a>,
-    clean: bool,
+    count: usize,
 }
 
 /// A key with its value.
@@ -30,11 +33,11 @@ pub(super) struct Entry<'t, 'i> {
 impl<'a> Notes<'a> {
     pub(super) fn new(file: &'a str, text: &'a str) -> Self {
         let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(newline, _)| newline + 1));
-        Self { text, lines: lines.collect(), findings: Collector::new(file, text), clean: true }
+        Self { text, lines: lines.collect(), findings: Collector::new(file, text), count: 0 }
     }
 
     pub(super) fn add(&mut self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) {
-        self.clean = false;
+        self.count += 1;
         self.findings.add(span, message, help);
     }
 
@@ -47,7 +50,12 @@ impl<'a> Notes<'a> {
     }
 
     pub(super) fn is_clean(&self) -> bool {
-        self.clean
+        self.count == 0
+    }
+
+    /// Whether that much was found that nobody reads on, nor looks for more.
+    pub(super) fn is_full(&self) -> bool {
+        self.count >= MOST_FOUND
     }
 
     pub(super) fn finish(self) -> Result<(), Findings> {
@@ -82,6 +90,18 @@ impl<'a> Notes<'a> {
         }
     }
 
+    /// A text on one line, of so many characters at most.
+    pub(super) fn line(&mut self, entry: &Entry<'_, '_>, most: usize) -> Option<String> {
+        let text = self.text(entry)?;
+        let text = text.trim();
+        let fits = (1..=most).contains(&text.chars().count()) && !text.contains(char::is_control);
+        if !fits {
+            let message = format!("this is no {}", entry.key);
+            self.add(entry.value.span(), message, format!("write 1 to {most} characters on one line"));
+        }
+        fits.then(|| text.to_owned())
+    }
+
     /// One text, or a list of texts, each with its place.
     pub(super) fn texts(&mut self, entry: &Entry<'_, '_>) -> Vec<(String, Range<usize>)> {
         let items = match entry.value.get_ref() {
@@ -107,7 +127,11 @@ impl<'a> Notes<'a> {
             DeValue::String(text) => Some(text.as_ref().to_owned()),
             DeValue::Integer(integer) => match i64::from_str_radix(integer.as_str(), integer.radix()) {
                 Ok(number) => Some(number.to_string()),
-                Err(_) => self.wrong_type(entry, "a smaller number"),
+                Err(_) => {
+                    let message = format!("`{}` is {}", entry.key, shown(integer.as_str()));
+                    self.add(entry.value.span(), message, "write a smaller number");
+                    None
+                }
             },
             DeValue::Float(float) => Some(float.as_str().to_owned()),
             _ => self.wrong_type(entry, "a text in quotes, or a number"),
@@ -116,11 +140,15 @@ impl<'a> Notes<'a> {
 
     /// A whole number that is not negative.
     pub(super) fn whole(&mut self, entry: &Entry<'_, '_>) -> Option<u64> {
-        let number = entry.value.get_ref().as_integer();
-        match number.and_then(|number| u64::from_str_radix(number.as_str(), number.radix()).ok()) {
-            Some(number) => Some(number),
-            None => self.wrong_type(entry, "a whole number from 0 on, without quotes"),
+        let Some(integer) = entry.value.get_ref().as_integer() else {
+            return self.wrong_type(entry, "a whole number without quotes");
+        };
+        let number = u64::from_str_radix(integer.as_str(), integer.radix()).ok();
+        if number.is_none() {
+            let message = format!("`{}` is {}", entry.key, shown(integer.as_str()));
+            self.add(entry.value.span(), message, format!("write a whole number from 0 to {}", u64::MAX));
         }
+        number
     }
 
     pub(super) fn duration(
