@@ -6,8 +6,8 @@ use busbar_profile::{Findings, nearest};
 use toml::de::DeTable;
 
 use super::{Faults, Kind, Often, Rule};
-use crate::notes::text::shown;
 use crate::notes::{self, Entry, Notes, entries};
+use busbar_profile::text::shown;
 
 const FILE: [&str; 2] = ["seed", "faults"];
 const FAULT: [&str; 11] =

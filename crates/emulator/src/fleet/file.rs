@@ -9,8 +9,8 @@ use toml::de::DeTable;
 use super::{Fleet, Joint, Member};
 use crate::config::Config;
 use crate::device::Device;
-use crate::notes::text::shown;
 use crate::notes::{self, Entry, Notes, entries};
+use busbar_profile::text::shown;
 
 const FILE: [&str; 5] = ["fleet", "wires", "controllers", "supplies", "bus_bars"];
 const WIRE: [&str; 2] = ["id", "endpoint"];
@@ -81,7 +81,7 @@ fn head(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<String> {
         match inner.key.as_str() {
             "title" => {
                 titled = true;
-                title = notes.title(&inner);
+                title = notes.line(&inner, 100);
             }
             _ => notes.unknown_key(&inner, "[fleet]", &["title"]),
         }
@@ -139,7 +139,7 @@ impl Draft {
             let known = self.members.iter().any(|(member, _)| Some(member.id.as_str()) == text);
             new_id(entry, known, notes)
         });
-        let name = of("name").map(|entry| notes.title(entry));
+        let name = of("name").map(|entry| notes.line(entry, 100));
         let wire = of("wire").and_then(|entry| self.wire_of(entry, notes));
         let (mut config, mut probe) = self.config(&all, notes)?;
         config.pins = settings(of("settings"), &mut probe, notes);

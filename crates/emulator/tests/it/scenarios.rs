@@ -42,6 +42,7 @@ scenarios! {
     dkg705_mains_failure: "dkg705-mains-failure.toml",
     dkg705_short_dip: "dkg705-short-dip.toml",
     dkg705_soft_transfer: "dkg705-soft-transfer.toml",
+    alarm_under_load: "alarm-under-load.toml",
     injected_alarms: "injected-alarms.toml",
     bus_tie_with_one_source_dead: "bus-tie.toml",
     tie_that_will_not_close: "tie-will-not-close.toml",

@@ -52,6 +52,9 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
         ..usual
     };
     let token = control::token()?;
+    if let Some(address) = args.control {
+        control::allow(address, token.as_ref())?;
+    }
     runtime::service(async |mut stop| {
         let emulation = busbar_emulator::start(config).await.map_err(failure)?;
         let control = match args.control {
