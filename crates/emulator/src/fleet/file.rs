@@ -22,7 +22,7 @@ const SUPPLY: [&str; 3] = ["from", "section", "to"];
 const MOST: usize = 100;
 
 pub(super) fn fleet(file: &str, text: &str) -> Result<Fleet, Findings> {
-    let fleet = notes::read(file, text, read)?;
+    let fleet = notes::read(file, text, "leave one of them out", read)?;
     // Without a finding there is a fleet.
     Ok(fleet.unwrap_or_else(|| Fleet {
         title: String::new(),

@@ -20,13 +20,14 @@ pub(crate) struct Place {
     pub(crate) column: usize,
 }
 
-/// Reads a file whose name only serves the findings. Nothing comes of a text in which anything is wrong.
+/// Reads a file whose name only serves the findings; `twice` is what to do about a key that is there twice. Nothing comes of a text in which anything is wrong.
 ///
 /// # Errors
 /// Everything that is wrong with it.
 pub(crate) fn read<T>(
     file: &str,
     text: &str,
+    twice: &str,
     understand: impl FnOnce(&DeTable<'_>, &mut Notes<'_>) -> Option<T>,
 ) -> Result<Option<T>, Findings> {
     let mut notes = Notes::new(file, text);
@@ -35,7 +36,7 @@ pub(crate) fn read<T>(
         let span = error.span().unwrap_or(0..0);
         let message = error.message().replace('\n', ", ");
         let help = match message.starts_with("duplicate key") {
-            true => "leave one of them out",
+            true => twice,
             false => syntax_help(text, span.start),
         };
         notes.add(span, format!("this is not TOML: {message}"), help);

@@ -13,6 +13,7 @@ use crate::device::Device;
 use crate::notes::{self, Entry, Notes, Place, entries};
 
 const FILE: [&str; 2] = ["scenario", "steps"];
+const TWICE: &str = "leave one of them; what happens twice takes two steps";
 const HEAD: [&str; 8] = ["title", "about", "controller", "model", "seed", "clock", "lasts", "settings"];
 
 const USUAL: Duration = Duration::from_secs(3600);
@@ -21,7 +22,7 @@ const LONGEST: Duration = Duration::from_secs(14 * 86_400);
 const SHORTEST: Duration = Duration::from_secs(1);
 
 pub(super) fn scenario(file: &str, text: &str) -> Result<Scenario, Findings> {
-    let scenario = notes::read(file, text, |root, notes| read(file, root, notes))?;
+    let scenario = notes::read(file, text, TWICE, |root, notes| read(file, root, notes))?;
     // Without a finding there is a scenario; an empty one plays to its end at once.
     Ok(scenario.unwrap_or_else(|| nothing(file)))
 }

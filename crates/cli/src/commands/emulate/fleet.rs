@@ -73,6 +73,9 @@ pub(super) fn run(
         }
     }
     let token = control::token()?;
+    if let Some(address) = args.control {
+        control::allow(address, token.as_ref())?;
+    }
     runtime::service(async |mut stop| {
         let emulation = start_fleet(fleet.clone()).await.map_err(failure)?;
         let control = match args.control {
