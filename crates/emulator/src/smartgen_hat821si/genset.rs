@@ -179,15 +179,16 @@ impl Genset {
         }
     }
 
-    /// A remote command: start, or stop.
-    pub(super) fn command(&mut self, start: bool) {
+    /// A remote command: start, or stop. In manual mode a stop is one whatever the set runs for.
+    pub(super) fn command(&mut self, start: bool, auto: bool) {
         self.commanded = start;
+        self.causes.mains_abnormal &= start || auto;
     }
 
     pub(super) fn step(&mut self, dt: Duration, scene: Scene<'_>, board: &mut Board) {
-        self.weigh(scene);
         let limits = scene.limits;
         let works = [0, 1].map(|set| limits.behind[set] && !board.has(Alarm::genset(set)));
+        self.weigh(scene, works != [false; 2]);
         let wanted = self.causes.any() && works != [false; 2];
         self.timer.step(dt);
         let elapsed = self.timer.is_over();
@@ -204,8 +205,8 @@ impl Genset {
         self.watch(dt, scene, board);
     }
 
-    /// Works out why one is to run.
-    fn weigh(&mut self, scene: Scene<'_>) {
+    /// Works out why one is to run; `can` says that there is one without a fault.
+    fn weigh(&mut self, scene: Scene<'_>, can: bool) {
         let limits = scene.limits;
         (self.choice, self.two) = (limits.choice, limits.are_two());
         self.not_scheduled = limits.not_run.and_then(|window| window.left(scene.now));
@@ -214,14 +215,18 @@ impl Genset {
         let by_mains = |source: usize| scene.available[source] && !scene.on_genset[source];
         // Once there are mains again it goes on until they have taken over.
         let relieved = (by_mains(0) || by_mains(1)) && !(self.causes.mains_abnormal && scene.serves);
-        let mains_abnormal = scene.auto && !relieved;
-        let may = !self.inhibited;
-        let by_clock = may && self.not_scheduled.is_none();
+        let runs = matches!(self.state, State::Started | State::StopDelay);
+        // In manual mode nothing starts by itself, and nobody but a person stops what runs.
+        let goes_on = !scene.auto && runs;
+        let may = limits.behind != [false; 2] && (!self.inhibited || goes_on);
+        let by_clock = may && scene.auto && self.not_scheduled.is_none();
+        // A start that cannot be obeyed is forgotten, or the set would start when nobody expects it.
+        self.commanded &= may && can;
         self.causes = Causes {
             on_load: may && scene.on_load_input,
             off_load: may && (self.commanded || scene.off_load_input),
-            mains_abnormal: by_clock && mains_abnormal,
-            scheduled: by_clock && scene.auto && self.scheduled.is_some(),
+            mains_abnormal: !relieved && (by_clock || may && goes_on && self.causes.mains_abnormal),
+            scheduled: by_clock && self.scheduled.is_some(),
         };
         self.carries = self.causes.on_load || self.causes.scheduled && limits.runs_on_load;
     }

@@ -293,8 +293,8 @@ impl Hat821si {
     fn press(&mut self, coil: u16) {
         match coil {
             ALARM_RESET => self.acknowledge(),
-            GENSET_START => self.genset.command(true),
-            GENSET_STOP => self.genset.command(false),
+            GENSET_START => self.genset.command(true, self.auto),
+            GENSET_STOP => self.genset.command(false, self.auto),
             TRANSFER_000 => self.transfer(Positions::OPEN),
             TRANSFER_101 => self.transfer(NORMAL),
             TRANSFER_110 => self.transfer(Positions::of(1, 1, 0)),
