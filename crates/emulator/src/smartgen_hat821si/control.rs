@@ -66,6 +66,8 @@ pub(super) struct Control {
 }
 
 /// What a wish is made of.
+    /// Those of them with which nothing is wrong at this moment.
+    pub(super) faultless: [bool; 2],
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scene {
     pub(super) auto: bool,
@@ -74,6 +76,14 @@ pub(super) struct Scene {
     /// Sources that are there only because a genset stands in for their mains.
     pub(super) guests: [bool; 2],
     pub(super) restores: bool,
+impl Scene {
+    /// A source in doubt would be given something that it does not feed yet.
+    fn doubts(&self, position: Positions) -> bool {
+        let (now, then) = (self.bars.now.feeds(), position.feeds());
+        (0..2).any(|source| !self.faultless[source] && (0..2).any(|it| then[it][source] && !now[it][source]))
+    }
+}
+
     /// Everything has to be open.
     pub(super) forced_open: bool,
     pub(super) bars: Bars,
@@ -128,8 +138,10 @@ impl Control {
             && (0..2).all(|source| chosen[source] || !feeds(self.target, source));
         if self.settled && !scene.restores && serves {
             return self.target;
-        }
+        // Nothing is closed onto a source that may be given up in a moment.
+        let wish = wish.filter(|wish| *wish == self.target || !scene.doubts(*wish));
         self.settled = true;
+        }
         let wish = wishes
             .iter()
             .copied()
@@ -140,7 +152,7 @@ impl Control {
     /// A command for a position; ignored where a source or a switch does not permit it.
     pub(super) fn transfer(&mut self, to: Positions, scene: Scene) {
         let dead = (0..2).any(|source| to.is_closed(Switch::OF_SOURCES[source]) && !scene.available[source]);
-        if dead || scene.forced_open || !scene.bars.permit(to) {
+        if dead || scene.doubts(to) || scene.forced_open || !scene.bars.permit(to) {
             return;
         }
         self.target = to;
@@ -157,6 +169,7 @@ impl Control {
 mod tests {
     use super::*;
 
+            faultless: [true; 2],
     fn scene() -> Scene {
         Scene {
             auto: true,
@@ -250,6 +263,24 @@ mod tests {
         assert_eq!(wish(&mut control, Scene { forced_open: true, auto: false, ..scene() }), [0, 0, 0]);
         assert_eq!(
             wish(&mut control, Scene { auto: false, ..scene() }),
+    #[test]
+    fn nothing_is_closed_onto_a_source_in_doubt() {
+        let bars = Bars { now: NORMAL, ..Bars::default() };
+        let lost = Scene { available: [false, true], bars, ..scene() };
+        let doubted = Scene { faultless: [false; 2], ..lost };
+        let mut control = Control::new(NORMAL);
+        assert_eq!(wish(&mut control, doubted), [1, 0, 1], "nor anything opened for it");
+        assert_eq!(wish(&mut control, Scene { faultless: [false, true], ..lost }), [0, 1, 1]);
+        assert_eq!(wish(&mut control, doubted), [0, 1, 1], "what has begun goes on");
+
+        let mut control = Control::new(NORMAL);
+        let doubted = Scene { faultless: [true, false], bars, ..scene() };
+        control.transfer(FROM_S2, doubted);
+        assert_eq!(control.target(), NORMAL, "a command neither");
+        control.transfer(FROM_S1, doubted);
+        assert_eq!(control.target(), FROM_S1);
+    }
+
             [0, 0, 0],
             "until somebody closes it"
         );

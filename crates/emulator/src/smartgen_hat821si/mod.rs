@@ -259,6 +259,7 @@ impl Hat821si {
             available: self.available(),
             guests: self.guests(),
             restores: self.limits.restores || self.inputs.has(Input::AutoRestore),
+            faultless: self.supervision.each_ref().map(Supervision::is_faultless),
             forced_open: self.protection.forces_open(&self.board),
             bars: self.bars(),
         }
