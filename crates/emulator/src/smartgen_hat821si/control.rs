@@ -41,11 +41,6 @@ impl Bars {
             && !(over_tie && supplies.into_iter().any(|source| self.no_supply_over_tie[source]))
     }
 
-    /// A switch is closed that has to be open.
-    pub(super) fn forbid_present(&self) -> bool {
-        Switch::ALL.into_iter().any(|switch| self.locked.is_closed(switch) && self.now.is_closed(switch))
-    }
-
     /// What is left of a position without the switches that have to be open or did not close.
     fn left_of(&self, position: Positions) -> Positions {
         Positions::by(|switch| {
@@ -66,27 +61,27 @@ pub(super) struct Control {
 }
 
 /// What a wish is made of.
-    /// Those of them with which nothing is wrong at this moment.
-    pub(super) faultless: [bool; 2],
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scene {
     pub(super) auto: bool,
     pub(super) masters: [bool; 2],
     pub(super) available: [bool; 2],
+    /// Those of them with which nothing is wrong at this moment.
+    pub(super) faultless: [bool; 2],
     /// Sources that are there only because a genset stands in for their mains.
     pub(super) guests: [bool; 2],
     pub(super) restores: bool,
+    /// Everything has to be open.
+    pub(super) forced_open: bool,
+    pub(super) bars: Bars,
+}
+
 impl Scene {
     /// A source in doubt would be given something that it does not feed yet.
     fn doubts(&self, position: Positions) -> bool {
         let (now, then) = (self.bars.now.feeds(), position.feeds());
         (0..2).any(|source| !self.faultless[source] && (0..2).any(|it| then[it][source] && !now[it][source]))
     }
-}
-
-    /// Everything has to be open.
-    pub(super) forced_open: bool,
-    pub(super) bars: Bars,
 }
 
 impl Control {
@@ -138,14 +133,14 @@ impl Control {
             && (0..2).all(|source| chosen[source] || !feeds(self.target, source));
         if self.settled && !scene.restores && serves {
             return self.target;
-        // Nothing is closed onto a source that may be given up in a moment.
-        let wish = wish.filter(|wish| *wish == self.target || !scene.doubts(*wish));
-        self.settled = true;
         }
         let wish = wishes
             .iter()
             .copied()
             .find(|wish| bars.permit(*wish) && (0..2).all(|source| usable[source] || !feeds(*wish, source)));
+        // Nothing is closed onto a source that may be given up in a moment.
+        let wish = wish.filter(|wish| *wish == self.target || !scene.doubts(*wish));
+        self.settled = true;
         wish.unwrap_or_else(|| bars.left_of(self.target))
     }
 
@@ -169,12 +164,12 @@ impl Control {
 mod tests {
     use super::*;
 
-            faultless: [true; 2],
     fn scene() -> Scene {
         Scene {
             auto: true,
             masters: [true; 2],
             available: [true; 2],
+            faultless: [true; 2],
             guests: [false; 2],
             restores: true,
             forced_open: false,
@@ -263,6 +258,11 @@ mod tests {
         assert_eq!(wish(&mut control, Scene { forced_open: true, auto: false, ..scene() }), [0, 0, 0]);
         assert_eq!(
             wish(&mut control, Scene { auto: false, ..scene() }),
+            [0, 0, 0],
+            "until somebody closes it"
+        );
+    }
+
     #[test]
     fn nothing_is_closed_onto_a_source_in_doubt() {
         let bars = Bars { now: NORMAL, ..Bars::default() };
@@ -279,11 +279,6 @@ mod tests {
         assert_eq!(control.target(), NORMAL, "a command neither");
         control.transfer(FROM_S1, doubted);
         assert_eq!(control.target(), FROM_S1);
-    }
-
-            [0, 0, 0],
-            "until somebody closes it"
-        );
     }
 
     #[test]

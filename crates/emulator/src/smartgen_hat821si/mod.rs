@@ -376,8 +376,8 @@ impl Hat821si {
             not_opened: self.stuck(Drive::Open),
             may_loop: self.limits.sync.loops() && faultless,
             in_step: self.synchroscope.is_in_step(&self.limits.sync, &self.limits.supervision),
-            // Elevators are not waited for where something has to open.
-            alive: self.plant.alive().contains(&true) && !wishes.forced_open && !wishes.bars.forbid_present(),
+            forced: if wishes.forced_open { Positions::ALL_CLOSED } else { wishes.bars.locked },
+            alive: self.plant.alive(),
         };
         match self.sequence.step(dt, view, &self.limits.transfer) {
             Some(Failure::Move(switch, drive)) => self.board.latch(Alarm::stuck(switch, drive)),
