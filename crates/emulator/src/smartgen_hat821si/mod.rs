@@ -24,6 +24,7 @@ mod sync;
 mod timer;
 mod transfer;
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use busbar_modbus::ExceptionCode;
@@ -128,7 +129,8 @@ pub(crate) struct Hat821si {
     local: bool,
     masters: [bool; 2],
     remote_outputs: [bool; REMOTE_OUTPUTS],
-    alarms: usize,
+    /// Those of a moment ago: the horn sounds for each that is new.
+    alarms: BTreeSet<Alarm>,
     horn: Duration,
     /// How long each source has fed a section.
     source_supply: [Duration; 2],
@@ -168,7 +170,7 @@ impl Hat821si {
             local: false,
             masters: [true; 2],
             remote_outputs: [false; REMOTE_OUTPUTS],
-            alarms: 0,
+            alarms: BTreeSet::new(),
             horn: Duration::ZERO,
             source_supply,
             load_supply: source_supply.map(|own| SupplyTime::new(own, &mut random)),
@@ -410,8 +412,9 @@ impl Hat821si {
     }
 
     fn sound(&mut self, dt: Duration) {
-        let alarms = self.board.count();
-        self.horn = if alarms > self.alarms { self.limits.horn } else { self.horn.saturating_sub(dt) };
+        let alarms = self.board.active();
+        let news = !alarms.is_subset(&self.alarms);
+        self.horn = if news { self.limits.horn } else { self.horn.saturating_sub(dt) };
         self.alarms = alarms;
     }
 

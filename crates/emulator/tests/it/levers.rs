@@ -15,7 +15,7 @@ const KEYS: [u16; 7] = [1, 2, 4, 8, 16, 32, 64];
 const MODES: [u16; 4] = [0x10, 0x20, 0x40, 0x80];
 
 #[derive(Clone, Copy, Debug)]
-enum Event {
+pub(crate) enum Event {
     /// A lever by its number, and how far into its positions.
     Lever(usize, f64),
     /// A command by its number.
@@ -24,7 +24,8 @@ enum Event {
     Alarm(usize, bool),
 }
 
-fn events() -> impl Strategy<Value = Vec<(Event, u64)>> {
+/// What happens, and for how many tenths of a second it then goes on.
+pub(crate) fn events() -> impl Strategy<Value = Vec<(Event, u64)>> {
     let event = prop_oneof![
         5 => (any::<usize>(), 0.0..1.0).prop_map(|(number, part)| Event::Lever(number, part)),
         3 => any::<usize>().prop_map(Event::Command),
@@ -43,7 +44,7 @@ fn position(lever: &Lever, part: f64) -> String {
     }
 }
 
-fn happen(site: &mut Site, event: Event) {
+pub(crate) fn happen(site: &mut Site, event: Event) {
     match event {
         Event::Lever(number, part) => {
             let levers = site.device.levers();
