@@ -70,6 +70,8 @@ pub(super) struct Scene {
     pub(super) faultless: [bool; 2],
     /// Sources that are there only because a genset stands in for their mains.
     pub(super) guests: [bool; 2],
+    /// Sources whose genset is to stop when another one has taken its load over.
+    pub(super) leaving: [bool; 2],
     pub(super) restores: bool,
     /// Everything has to be open.
     pub(super) forced_open: bool,
@@ -116,9 +118,9 @@ impl Control {
             |source: usize| scene.available[source] && bars.permits_switch(Switch::OF_SOURCES[source]);
         let usable = [usable(0), usable(1)];
         let guest = |source: usize| usable[source] && scene.guests[source];
-        // A genset is relieved as soon as there are mains.
-        let chosen = [0, 1]
-            .map(|source| usable[source] && !(guest(source) && usable[1 - source] && !guest(1 - source)));
+        // A genset is relieved as soon as there are mains, or the set whose turn it is.
+        let goes = |source: usize| scene.leaving[source] || guest(source) && !guest(1 - source);
+        let chosen = [0, 1].map(|source| usable[source] && !(usable[1 - source] && goes(source)));
         let wishes: &[Positions] = match (chosen, scene.masters) {
             ([true, true], [true, false]) => &[FROM_S1, NORMAL],
             ([true, true], [false, true]) => &[FROM_S2, NORMAL],
@@ -171,6 +173,7 @@ mod tests {
             available: [true; 2],
             faultless: [true; 2],
             guests: [false; 2],
+            leaving: [false; 2],
             restores: true,
             forced_open: false,
             bars: Bars::default(),
@@ -208,6 +211,8 @@ mod tests {
         let bars = Bars { inhibited: Positions::of(0, 1, 0), ..Bars::default() };
         assert_eq!(wish(&mut control, Scene { bars, ..guest }), [1, 0, 1], "section 2 has nobody else");
         assert_eq!(wish(&mut control, Scene { guests: [true; 2], ..scene() }), [1, 0, 1]);
+        let turn = Scene { guests: [true; 2], leaving: [true, false], ..scene() };
+        assert_eq!(wish(&mut control, turn), [0, 1, 1], "the turn of the other set");
         let lazy = Scene { restores: false, ..guest };
         assert_eq!(wish(&mut control, lazy), [1, 1, 0]);
     }

@@ -260,6 +260,7 @@ impl Hat821si {
             masters: self.masters,
             available: self.available(),
             guests: self.guests(),
+            leaving: self.genset.leaving(),
             restores: self.limits.restores || self.inputs.has(Input::AutoRestore),
             faultless: self.supervision.each_ref().map(Supervision::is_faultless),
             forced_open: self.protection.forces_open(&self.board),
@@ -347,14 +348,16 @@ impl Hat821si {
 
     fn ask_for_gensets(&mut self, dt: Duration) {
         let guests = self.guests();
-        let serves = self.plant.feeds().iter().any(|by| by[0] && guests[0] || by[1] && guests[1]);
+        let on_genset = self.plant.sources.each_ref().map(Source::is_on_genset);
+        let feeds = [0, 1].map(|source: usize| self.plant.feeds().iter().any(|by| by[source]));
         let scene = genset::Scene {
             now: self.now(),
             auto: self.auto,
             masters: self.masters,
             available: self.available(),
-            on_genset: self.plant.sources.each_ref().map(Source::is_on_genset),
-            serves,
+            on_genset,
+            serves: (0..2).any(|source| feeds[source] && guests[source]),
+            feeds: [0, 1].map(|source: usize| feeds[source] && on_genset[source]),
             on_load_input: self.inputs.has(Input::StartOnLoad),
             off_load_input: self.inputs.has(Input::StartOffLoad),
             inhibited: self.inputs.has(Input::StartInhibit),

@@ -15,6 +15,7 @@ struct Yard {
     runs: [bool; 2],
     auto: bool,
     serves: bool,
+    feeds: [bool; 2],
     inputs: [bool; 3],
 }
 
@@ -33,6 +34,7 @@ impl Yard {
             runs: [false; 2],
             auto: true,
             serves: false,
+            feeds: [false; 2],
             inputs: [false; 3],
         }
     }
@@ -49,6 +51,7 @@ impl Yard {
                 available: [0, 1].map(|source| self.available[source] || self.runs[source]),
                 on_genset: [0, 1].map(|source| !self.available[source] && self.runs[source]),
                 serves: self.serves,
+                feeds: self.feeds,
                 on_load_input,
                 off_load_input,
                 inhibited,
@@ -202,7 +205,7 @@ fn a_set_that_does_not_run_is_told_of() {
     assert!(!yard.board.has(Alarm::genset(1)));
     yard.walk(10);
     assert!(yard.board.has(Alarm::genset(1)));
-    assert_eq!(yard.walk(1).2, [false; 2], "it is not asked again");
+    assert_eq!(yard.walk(1), (9, 0, [false; 2]), "it is not asked again");
     yard.board.reset();
     yard.healthy[1] = true;
     assert_eq!(yard.walk(5).2, [false, true]);
@@ -226,8 +229,12 @@ fn of_two_sets_one_is_chosen() {
     yard.available = [false, false];
     assert_eq!(yard.walk(10).2, [false, true]);
     assert_eq!(yard.genset.choice_bit(), Some(0));
+    yard.feeds = [false, true];
     yard.walk(54);
-    assert_eq!(yard.walk(2).2, [true, false], "its turn was a minute");
+    assert_eq!(yard.walk(9).2, [true, true], "its turn was a minute, and it still feeds somebody");
+    assert_eq!(yard.genset.leaving(), [false, true]);
+    yard.feeds = [true, false];
+    assert_eq!(yard.walk(1).2, [true, false]);
 
     let mut yard = two("2");
     yard.genset.command(true, true);
