@@ -170,7 +170,7 @@ proptest! {
                     let grid = lever.id.starts_with("src") && !lever.id.ends_with(".pt");
                     let befalls = grid || lever.id.starts_with("genset") || lever.id.starts_with("input");
                     let faults = lever.id.starts_with("short_circuit");
-                    if !faults && !(befalls && unit.sequence.loops()) {
+                    if !(faults || befalls && unit.sequence.loops()) {
                         unit.pull(lever.id, position(lever, part));
                     }
                 }

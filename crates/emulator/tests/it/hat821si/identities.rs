@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use proptest::test_runner::RngSeed;
 
-use super::{ON, bit, positions, quiet, send, with, with_story};
+use super::{ON, bit, positions, pull, quiet, send, with, with_story};
 use crate::levers::{events, happen};
 use crate::site::{Site, TENTH};
 
@@ -251,6 +251,35 @@ fn differences_agree(site: &Site, place: &str) {
             assert!(turns.min(360.0 - turns) < 0.11, "{place}: {first} {second} {shown}");
         }
         _ => assert_eq!(shown, 0.0, "{place}"),
+    }
+}
+
+#[test]
+fn at_both_ends_of_each_setting_a_bad_day_obeys_physics() {
+    let all: Vec<_> = quiet().device.settings().map(|(setting, _)| setting).collect();
+    for setting in all.iter().filter(|setting| !setting.id.ends_with("_priority")) {
+        for end in [setting.min, setting.max].map(|end| end.to_string()) {
+            let mut site = with(&[(&setting.id, &end)]);
+            for (lever, to, seconds) in [
+                ("load1", "3000", 5),
+                ("src1", "failed", 20),
+                ("src2", "l1_lost", 40),
+                ("src1", "normal", 25),
+                ("src2", "normal", 20),
+            ] {
+                pull(&mut site, lever, to);
+                for _ in 0..seconds {
+                    site.pass_seconds(1);
+                    let place = format!("{} = {end}, {lever} {to}", setting.id);
+                    for source in ["s1", "s2"] {
+                        voltages_agree(&site, source, &place);
+                    }
+                    outputs_agree(&site, &place);
+                    derived_bits_agree(&site, &place);
+                }
+            }
+            assert_eq!(site.device.misfits(), 0, "{} = {end}", setting.id);
+        }
     }
 }
 
