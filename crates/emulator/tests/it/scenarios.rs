@@ -50,6 +50,8 @@ scenarios! {
     both_sources_dead: "both-sources-dead.toml",
     switch_in_test_position: "switch-in-test-position.toml",
     remote_transfer: "remote-transfer.toml",
+    forced_opening_with_a_switch_that_jams: "forced-open.toml",
+    genset_that_is_asked_for_too_much: "genset-overloaded.toml",
     dkg705_weekly_exercise: "dkg705-weekly-exercise.toml",
     dkg705_out_of_step: "dkg705-out-of-step.toml",
     dkg705_runaway: "dkg705-runaway.toml",
