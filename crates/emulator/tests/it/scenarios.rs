@@ -61,6 +61,7 @@ scenarios! {
     compressor_day: "compressor-day.toml",
     compressor_hot_discharge: "compressor-hot-discharge.toml",
     compressor_locked: "compressor-locked.toml",
+    compressor_blind_start: "compressor-blind-start.toml",
     compressor_particle_filter: "compressor-particle-filter.toml",
     compressor_filter_neglected: "compressor-filter-neglected.toml",
     compressor_blow_down_blocked: "compressor-blow-down-blocked.toml",
