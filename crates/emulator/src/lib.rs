@@ -16,6 +16,7 @@ mod datakom_dkg705;
 mod device;
 mod error;
 mod facts;
+mod history;
 mod inject;
 mod lcd;
 mod levers;

@@ -26,6 +26,7 @@ use busbar_profile::{Command, DateTime, Findings, Profile};
 use crate::config::Config;
 use condition::Condition;
 
+pub(crate) use narrator::Narrator;
 pub(crate) use player::Player;
 pub use report::{Check, CheckVerdict, Event, EventKind, Report, Seen};
 
