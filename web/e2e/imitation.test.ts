@@ -120,7 +120,7 @@ test('at a choice the mains of a genset fail, and the site saves itself', async 
   await operator.getByRole('link', { name: 'Genset 2' }).click()
   await operator.getByRole('heading', { level: 2, name: 'Genset 2' }).waitFor()
   await press(operator, 'Fail the mains')
-  await operator.getByText('Pulled: Mains (failed)').waitFor()
+  await operator.getByRole('list', { name: 'What is pulled' }).getByText('Mains: failed').waitFor()
   await operator.screenshot({ path: `${SHOTS}imitation-failed.png`, fullPage: true })
   await operator.getByRole('link', { name: 'Operator’s page' }).click()
 
@@ -130,7 +130,10 @@ test('at a choice the mains of a genset fail, and the site saves itself', async 
 
   // Minutes pass until the mains are believed again; nobody waits for them here.
   const page = await open(imitation('genset-2'))
-  await page.getByText('State: load on genset').waitFor()
+  await page.locator('#state').getByText('State: load on genset').waitFor()
+  const lately = page.getByRole('list', { name: 'Lately' })
+  await lately.getByText('Mains: failed').waitFor()
+  await lately.getByText('Genset breaker closed').first().waitFor()
   await press(page, 'Give the mains back')
   await page.getByText('Nothing is pulled.').waitFor()
   await press(page, '+ 10 min')
@@ -162,16 +165,79 @@ test('by keyboard alone the clock is stopped, stepped, and goes on', async () =>
   await page.close()
 })
 
+test('everything goes back to normal at one word, by keyboard, and whoever is there stays there', async () => {
+  const page = await open(imitation('switch-1'))
+  const at = () => page.evaluate(() => document.activeElement?.textContent)
+  const pulled = page.getByRole('list', { name: 'What is pulled' })
+  const key = async (name: string) => {
+    await page.getByRole('button', { name, exact: true }).focus()
+    await page.keyboard.press('Enter')
+  }
+  await key('Fail source 1')
+  await pulled.getByText('Mains of source 1: failed').waitFor()
+  await expect.poll(at).toBe('Give source 1 back')
+  await key('Jam the bus tie')
+  await pulled.getByText('will not close').waitFor()
+  await page.getByLabel('Alarm', { exact: true }).fill('overload')
+  await press(page, 'Inject')
+  await pulled.getByText('(warning): injected').waitFor()
+  expect(await pulled.getByRole('listitem').count()).toBe(3)
+  await key('Put Mains of source 1 back')
+  await expect.poll(() => pulled.getByRole('listitem').count()).toBe(2)
+  await expect.poll(at).toBe('Put back')
+  await key('All back to normal')
+  await page.getByText('Nothing is pulled.').waitFor()
+  expect(await at()).toBe('What is pulled')
+  await page.getByRole('status').getByText('All back to normal').waitFor()
+  expect(complaints).toEqual([])
+  await page.close()
+})
+
+test('a page elsewhere changes nothing', async () => {
+  const page = await browser.newPage()
+  await page.route('http://elsewhere.example/**', (route) =>
+    route.fulfill({ contentType: 'text/html', body: '<p>Elsewhere</p>' }),
+  )
+  await page.goto('http://elsewhere.example/')
+  const one = `${demo.address}imitation/api/v1/controllers/compressor-1`
+  const done = await page.evaluate(async (one) => {
+    const tried = [
+      ['PUT', 'levers/tank', '{"position":0}', 'cors'],
+      ['PUT', 'normal', undefined, 'cors'],
+      ['POST', 'steps', '{"seconds":3600}', 'cors'],
+      ['POST', 'steps', '{"seconds":3600}', 'no-cors'],
+      ['DELETE', 'pins/fuel_level', undefined, 'cors'],
+    ] as const
+    let through = 0
+    for (const [method, path, body, mode] of tried) {
+      const headers = { 'content-type': mode === 'cors' ? 'application/json' : 'text/plain' }
+      const answer = await fetch(`${one}/${path}`, { method, body, mode, headers }).catch(() => null)
+      if (answer?.ok) through += 1
+    }
+    navigator.sendBeacon(`${one}/steps`, new Blob(['{"seconds":3600}'], { type: 'text/plain' }))
+    return through
+  }, one)
+  expect(done).toBe(0)
+  const state = (await (await page.request.get(one)).json()) as {
+    clock: { time_s: number }
+    levers: { back: unknown }[]
+  }
+  expect(state.clock.time_s).toBeLessThan(3600)
+  expect(state.levers.filter(({ back }) => back !== null)).toEqual([])
+  await page.close()
+})
+
 test('a point is pinned and let go, and what cannot be is told in a sentence', async () => {
   const page = await open(imitation('genset-1'))
-  await page.getByText('Pinned points').click()
+  await page.getByText('Pin a point').click()
   const pin = async (point: string, value: string) => {
     await page.getByLabel('Point', { exact: true }).fill(point)
     await page.getByLabel('Value', { exact: true }).fill(value)
     await press(page, 'Pin')
   }
   await pin('battery_voltage', '21.5')
-  await page.getByText('battery_voltage = 21.5').waitFor()
+  const pulled = page.getByRole('list', { name: 'What is pulled' })
+  await pulled.getByText('battery_voltage = 21.5: pinned').waitFor()
   expect(await page.getByRole('img').getAttribute('aria-label')).toContain('Battery, 21.5 V')
   expect(complaints).toEqual([])
   await pin('battery_voltage', 'flat')
@@ -180,7 +246,7 @@ test('a point is pinned and let go, and what cannot be is told in a sentence', a
   await press(page, 'Inject')
   await page.getByRole('alert').getByText('the controller has no alarm `no_such_alarm`').waitFor()
   await press(page, 'Let battery_voltage go')
-  await expect.poll(() => page.getByRole('list', { name: 'Pinned points' }).innerText()).toBe('')
+  await page.getByText('Nothing is pulled.').waitFor()
   expect(await page.getByRole('alert').isVisible()).toBe(false)
   await page.close()
 })
@@ -194,14 +260,16 @@ test('of many levers the one that is looked for is pulled, and an injected alarm
   await page.getByRole('searchbox', { name: 'Find a lever' }).fill('radiator')
   await expect.poll(() => levers.count()).toBe(1)
   await levers.getByRole('button', { name: 'blocked' }).click()
-  await page.getByText('Pulled: Radiator (blocked)').waitFor()
+  const pulled = page.getByRole('list', { name: 'What is pulled' })
+  await pulled.getByText('Radiator: blocked').waitFor()
   expect(await levers.getByRole('button', { name: 'blocked' }).getAttribute('aria-pressed')).toBe('true')
   await press(page, 'Clear the radiator')
   await page.getByText('Nothing is pulled.').waitFor()
 
   await page.getByLabel('Alarm', { exact: true }).fill('warning_alarms.high_oil_temperature')
   await press(page, 'Inject')
-  await page.getByRole('list', { name: 'Injected alarms' }).getByText('(warning)').waitFor()
+  await pulled.getByText('(warning): injected').waitFor()
+  await page.getByRole('list', { name: 'Active alarms' }).getByText('warning').first().waitFor()
   const alarms = async () =>
     (await page.request.get(new URL('api/v1/alarms', demo.address).href)).json() as Promise<{ id: string }[]>
   const told = async () => (await alarms()).some(({ id }) => id === 'high_oil_temperature')
@@ -236,7 +304,7 @@ test('an imitation with a token asks for it', async () => {
 test.runIf(process.env.BUSBAR_SCREENSHOT === '1')('the picture of the documentation', async () => {
   const page = await open(imitation('genset-2'), { width: 1100, height: 700 })
   await press(page, 'Fail the mains')
-  await page.getByText('State: load on genset').waitFor({ timeout: REACTS_MS })
+  await page.locator('#state').getByText('State: load on genset').waitFor({ timeout: REACTS_MS })
   await page.screenshot({ path: `${DOCS}imitation.png` })
   await page.close()
 })

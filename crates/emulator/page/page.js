@@ -4,9 +4,11 @@ import { draw } from './plant.js'
 const EVERY_MS = 1000
 const STEPS = { '1 s': 1, '10 s': 10, '1 min': 60, '10 min': 600 }
 const SPEEDS = [0.1, 1, 2, 5, 10, 60, 600, 3600]
+/** As many events as somebody reads. */
+const LATEST = 50
 const TOKEN = 'busbar-imitation-token'
 
-/** What a person most often wants to happen: lever, position, what it is called, and what undoes it. */
+/** What an instructor most often wants to happen: lever, position, what it is called, and what undoes it. */
 const SWITCHES = [
   ['mains', 'failed', 'Fail the mains', 'Give the mains back'],
   ['src1', 'failed', 'Fail source 1', 'Give source 1 back'],
@@ -14,8 +16,24 @@ const SWITCHES = [
   ['tank', 0, 'Drain the tank'],
   ['tank', 100, 'Fill the tank'],
   ['radiator', 'blocked', 'Block the radiator', 'Clear the radiator'],
+  ['oil', 'leaking', 'Open an oil leak', 'Mend the oil leak'],
+  ['battery', 'flat', 'Flatten the battery', 'Renew the battery'],
+  ['breaker.genset', 'will_not_close', 'Jam the genset breaker', 'Free the genset breaker'],
+  ['switch.qtie', 'will_not_close', 'Jam the bus tie', 'Free the bus tie'],
+  ['air_filter', 'clogged', 'Clog the air filter', 'Clean the air filter'],
   ['emergency_stop', 'pressed', 'Press emergency stop', 'Release emergency stop'],
 ]
+
+/** What the events call things, and what people do. */
+const STATES = {
+  'state.engine': 'State',
+  'state.transfer': 'Transfer',
+  'state.genset': 'Genset',
+  'state.src1': 'Source 1',
+  'state.src2': 'Source 2',
+  mode: 'Mode',
+}
+const BREAKERS = { mains: 'Mains breaker', genset: 'Genset breaker', src1: 'QS1', src2: 'QS2', tie: 'QTIE' }
 
 const $ = (id) => document.getElementById(id)
 /** Belongs to the controller that is shown now; another one begins anew. */
@@ -95,15 +113,29 @@ const unitOf = (numbers) =>
   ({ degC: '°C', deg: '°', 'm3/min': 'm³/min' })[numbers?.unit] ?? numbers?.unit ?? ''
 const spaced = (word) => word.replaceAll('_', ' ')
 const round = (number) => Math.round(number * 100) / 100
-const isHealthy = (lever) => lever.words.length === 0 || lever.position === lever.words[0].id
+const isHealthy = (lever) => lever.back === null
+/** Seconds as a clock shows them. */
+function clock(seconds) {
+  const part = (of) => String(Math.floor(of) % 60).padStart(2, '0')
+  return `${Math.floor(seconds / 3600)}:${part(seconds / 60)}:${part(seconds)}`
+}
 const leverOf = (id) => shown.levers.find((lever) => lever.id === id)
 
-/** Puts new children into an element only where they are others, so that what has the focus keeps it. */
+/**
+ * Puts new children into an element only where they are others. Whoever was at one of them by keyboard is at the one in
+ * its place afterwards, or where nothing is left at the heading.
+ */
 function fill(element, key, make) {
   const now = JSON.stringify(key)
   if (element.dataset.key === now) return
   element.dataset.key = now
+  const places = () => [...element.querySelectorAll('a, button, select')]
+  const place = places().indexOf(document.activeElement)
   element.replaceChildren(...make())
+  if (place < 0) return
+  const there = places()
+  const next = there[Math.min(place, there.length - 1)] ?? element.parentElement.querySelector('[tabindex]')
+  next?.focus()
 }
 
 function showControllers() {
@@ -122,15 +154,85 @@ function showPlant(values) {
   const mode = values.get('mode')?.value
   $('state').textContent = `State: ${spaced(state ?? 'not known')} · Mode: ${spaced(mode ?? 'not known')}`
   $('drawing').replaceChildren(draw(shown, values))
-  const pulled = shown.levers.filter((lever) => !isHealthy(lever) && typeof lever.position === 'string')
-  const list = pulled.map((lever) => `${lever.name} (${spaced(lever.position)})`)
-  $('pulled').textContent = list.length > 0 ? `Pulled: ${list.join(' · ')}` : 'Nothing is pulled.'
+  const active = shown.active.length > 0 ? shown.active : [{ label: 'No alarm is active' }]
+  fill($('active'), [shown.id, active], () =>
+    active.map(({ class: kind, label }) =>
+      h('li', { className: kind ?? '' }, kind ? h('strong', {}, spaced(kind)) : '', ` ${label}`),
+    ),
+  )
+  showScenario()
+}
+
+function showScenario() {
+  const { scenario } = shown
+  $('scenario').hidden = !scenario
+  if (!scenario) return
+  const { title, steps, taken, failed, held } = scenario
+  const ends = { true: 'over, all expectations held', false: `over, ${failed} failed` }
+  const goesOn = `step ${taken} of ${steps}${failed > 0 ? `, ${failed} failed` : ''}`
+  $('scenario').textContent = `Scenario: ${title}, ${ends[held] ?? goesOn}`
+}
+
+/** One thing that was done, and what undoes it. */
+const done = (what, undo, name, act) =>
+  h('li', {}, h('span', {}, what), h('button', { onclick: act, aria: { label: name } }, undo))
+
+/** Everything that is not as it was: levers, injected alarms, pinned points. */
+function showPulled(pins) {
+  const levers = shown.levers.filter((lever) => !isHealthy(lever))
+  const count = levers.length + shown.injected.length + pins.length
+  $('nothing').hidden = count > 0
+  $('normal').hidden = count === 0
+  const held = levers.map(({ id, position, back, words }) => [id, words.length > 0 ? position : back])
+  fill($('pulled'), [shown.id, held, shown.injected.map(({ id }) => id), pins], () => [
+    ...levers.map((lever) =>
+      done(`${lever.name}: ${worded(lever, lever.position)}`, 'Put back', `Put ${lever.name} back`, () =>
+        pull(lever, lever.back),
+      ),
+    ),
+    ...shown.injected.map(({ id, label, class: kind }) =>
+      done(`${label} (${spaced(kind)}): injected`, 'Let go', `Let ${label} go`, () =>
+        act(`${label}: let go`, `/alarms/${id}`, 'DELETE'),
+      ),
+    ),
+    ...pins.map(({ point, value }) =>
+      done(`${point} = ${value ?? 'absent'}: pinned`, 'Let go', `Let ${point} go`, () =>
+        act(`${point}: let go`, `/pins/${point}`, 'DELETE'),
+      ),
+    ),
+  ])
+}
+
+/** An event as people tell it. */
+function told(text) {
+  const [, signal, label] = /^([\w.]+) .*?\((.*)\)$/.exec(text) ?? []
+  if (STATES[signal]) return `${STATES[signal]}: ${label}`
+  const [, not, breaker] = /^(not )?breaker\.(\w+)\.closed$/.exec(text) ?? []
+  if (breaker) return `${BREAKERS[breaker] ?? `Breaker ${breaker}`} ${not ? 'open' : 'closed'}`
+  if (/^(not )?mains\.failed$/.test(text))
+    return text.startsWith('not') ? 'The mains are back' : 'The mains have failed'
+  return text.charAt(0).toUpperCase() + spaced(text.slice(1))
+}
+
+function showLately(events) {
+  const latest = events.slice(0, LATEST)
+  fill($('lately'), [shown.id, latest], () =>
+    latest.length > 0
+      ? latest.map(({ at_s, kind, text }) =>
+          h(
+            'li',
+            { className: kind },
+            h('span', { className: 'time' }, clock(at_s)),
+            h('span', {}, told(text)),
+          ),
+        )
+      : [h('li', {}, 'Nothing has happened since this imitation was started.')],
+  )
 }
 
 function showClock() {
   const { time_s, speed, paused } = shown.clock
-  const part = (seconds, of) => String(Math.floor(seconds) % of).padStart(2, '0')
-  $('time').textContent = `${Math.floor(time_s / 3600)}:${part(time_s / 60, 60)}:${part(time_s, 60)}`
+  $('time').textContent = clock(time_s)
   $('paused').hidden = !paused
   const speeds = [...new Set([...SPEEDS, speed])].sort((one, other) => one - other)
   fill($('clock'), [shown.id, paused, speed], () => [
@@ -151,13 +253,8 @@ function showClock() {
   ])
 }
 
-const change = (clock) =>
-  act(
-    'paused' in clock ? (clock.paused ? 'Paused' : 'Goes on') : `Speed ${clock.speed}`,
-    '/clock',
-    'PUT',
-    clock,
-  )
+const change = (to) =>
+  act('paused' in to ? (to.paused ? 'Paused' : 'Goes on') : `Speed ${to.speed}`, '/clock', 'PUT', to)
 
 function showSwitches() {
   const known = SWITCHES.filter(([id]) => leverOf(id))
@@ -166,7 +263,7 @@ function showSwitches() {
     known.map(([id, to, name, undo]) => {
       const lever = leverOf(id)
       const back = undo !== undefined && !isHealthy(lever)
-      const position = back ? lever.words[0].id : to
+      const position = back ? lever.back : to
       return h('button', { className: 'big', onclick: () => pull(lever, position) }, back ? undo : name)
     }),
   )
@@ -231,46 +328,6 @@ function numberForm(numbers, name, set) {
   )
 }
 
-function showAlarms() {
-  fill($('injected'), [shown.id, shown.injected.map(({ id }) => id)], () =>
-    shown.injected.map(({ id, label, class: kind }) =>
-      h(
-        'li',
-        {},
-        h('span', {}, `${label} (${spaced(kind)})`),
-        h(
-          'button',
-          {
-            onclick: () => act(`${label}: let go`, `/alarms/${id}`, 'DELETE'),
-            aria: { label: `Let ${label} go` },
-          },
-          'Let go',
-        ),
-      ),
-    ),
-  )
-}
-
-function showPins(pins) {
-  fill($('pinned'), [shown.id, pins], () =>
-    pins.map(({ point, value }) =>
-      h(
-        'li',
-        {},
-        h('span', {}, `${point} = ${value}`),
-        h(
-          'button',
-          {
-            onclick: () => act(`${point}: let go`, `/pins/${point}`, 'DELETE'),
-            aria: { label: `Let ${point} go` },
-          },
-          'Let go',
-        ),
-      ),
-    ),
-  )
-}
-
 /** What does not change by itself: asked for once, when another controller is shown. */
 async function begin(id) {
   const [alarms, points] = await Promise.all([ask(`/${id}/alarms`), ask(`/${id}/points`)])
@@ -315,8 +372,8 @@ async function show() {
   const { id } = chosen
   if (id !== shown?.id) await begin(id)
   const state = statePoint ? ask(`/${id}/values?name=${statePoint}`) : []
-  const asked = [ask(`/${id}`), ask(`/${id}/values`), state, ask(`/${id}/pins`)]
-  const [next, signals, more, pins] = await Promise.all(asked)
+  const asked = [ask(`/${id}`), ask(`/${id}/values`), state, ask(`/${id}/pins`), ask(`/${id}/events`)]
+  const [next, signals, more, pins, events] = await Promise.all(asked)
   shown = next
   document.title = `${shown.name} · Imitation`
   showControllers()
@@ -324,8 +381,8 @@ async function show() {
   showClock()
   showSwitches()
   showLevers()
-  showAlarms()
-  showPins(pins)
+  showPulled(pins)
+  showLately(events)
   $('token').hidden = true
   $('site').hidden = false
 }
@@ -363,6 +420,12 @@ $('token').addEventListener('submit', (event) => {
   sessionStorage.setItem(TOKEN, new FormData(event.target).get('token'))
   tell('')
   void refresh().catch(failed)
+})
+
+$('normal').addEventListener('click', () => {
+  // It goes away with what it undoes.
+  $('pulled-title').focus()
+  void act('All back to normal', '/normal', 'PUT')
 })
 
 $('find').addEventListener('input', find)

@@ -2,10 +2,16 @@
 
 use std::cmp::Reverse;
 
+/// Nobody meant another word by one that is longer, in characters.
+const LONGEST: usize = 100;
+
 /// The candidate that differs least, and of those the one that begins alike for longest, if it is near enough to be
 /// meant and no other one is as near.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let length = word.chars().count();
+    if length > LONGEST {
+        return None;
+    }
     let limit = (length / 3).max(1);
     let begin_alike =
         |candidate: &str| word.chars().zip(candidate.chars()).take_while(|(a, b)| a == b).count();

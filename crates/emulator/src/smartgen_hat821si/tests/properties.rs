@@ -83,7 +83,7 @@ fn meter_is_lawful(meter: &Meter, carries: bool) -> Result<(), TestCaseError> {
         let (p, q, s) = (feed.active[phase], feed.reactive[phase], apparent[phase]);
         prop_assert!((s * s - p * p - q * q).abs() < 1e-6, "{meter:?}");
         prop_assert!(volts[phase] == 0.0 || (volts[phase] * meter.current[phase] / 1000.0 - s).abs() < 1e-6);
-        prop_assert!((0.0..9500.0).contains(&volts[phase]) && p >= 0.0 && q >= 0.0, "{meter:?}");
+        prop_assert!((0.0..11_700.0).contains(&volts[phase]) && p >= 0.0 && q >= 0.0, "{meter:?}");
         prop_assert!(meter.angles[phase].is_some() == (volts[phase] > 577.4), "{meter:?}");
         prop_assert!(carries || meter.current[phase] == 0.0, "an open switch carries nothing: {meter:?}");
     }
@@ -104,8 +104,6 @@ fn step_is_lawful(plant: &mut Plant, outputs: &Outputs) -> Result<(), TestCaseEr
     let jammed = plant.switches.iter().all(|switch| switch.condition() == Condition::WillNotOpen);
     // One that comes up joined to another one is parted from it by the next step.
     prop_assert!(jammed || !surged || !plant.is_surging(), "sources out of step stay joined");
-    let load: f64 = plant.sources.iter().map(|source| source.meter().power).sum();
-    prop_assert!((-30_000.0..30_000.0).contains(&load), "{load}");
     for (alive, by) in plant.alive().into_iter().zip(plant.feeds()) {
         prop_assert!(!alive || by != [false; 2], "voltage from nowhere");
     }
