@@ -124,6 +124,9 @@ pub(crate) struct Emulate {
     /// Play a scenario and end with it: 0 when all that it expects came, 1 when not, 2 when the file is wrong
     #[arg(long, value_name = "FILE")]
     pub(crate) scenario: Option<PathBuf>,
+    /// What goes wrong on the wires: requests that nobody hears, answers that come late, spoiled, forged or not at all
+    #[arg(long, value_name = "FILE")]
+    pub(crate) faults: Option<PathBuf>,
     /// Several controllers with their wires, and what joins their plants, in place of KEY and --listen
     #[arg(long, value_name = "FILE", conflicts_with_all = ["key", "listen", "unit", "model", "set", "scenario"])]
     pub(crate) fleet: Option<PathBuf>,

@@ -5,6 +5,9 @@ use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, Na
 /// Mistakes that are shown; who has mended these will see the others.
 const MOST_SHOWN: usize = 50;
 
+/// No more of a line is drawn, in bytes; of a longer one the sentence says it all.
+const LONGEST_LINE: usize = 400;
+
 /// One mistake in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Excerpt {
@@ -26,7 +29,9 @@ pub(crate) struct Excerpts {
 
 impl Excerpts {
     pub(crate) fn new(file: &str, text: String, excerpts: Vec<Excerpt>) -> Self {
-        Self { source: NamedSource::new(file, text), excerpts }
+        // Nothing in the file reaches a terminal that would obey it. Places stay as they are: a byte for a byte.
+        let tame = text.replace(|c: char| c.is_ascii_control() && c != '\n' && c != '\t', "?");
+        Self { source: NamedSource::new(file, tame), excerpts }
     }
 
     /// Each mistake and its remedy in one sentence.
@@ -45,7 +50,7 @@ impl Excerpts {
             }
             let shown = Shown { excerpt, source: &self.source };
             // The sentence alone still says everything if the excerpt cannot be drawn.
-            if handler.render_report(&mut text, &shown).is_err() {
+            if !self.is_drawn(excerpt) || handler.render_report(&mut text, &shown).is_err() {
                 text.push_str(&format!("{}; {}\n", excerpt.sentence, excerpt.help));
             }
         }
@@ -53,6 +58,15 @@ impl Excerpts {
             text.push_str(&format!("\nand {more} more\n"));
         }
         text
+    }
+}
+
+impl Excerpts {
+    /// Whether its line and those around it can be looked at.
+    fn is_drawn(&self, excerpt: &Excerpt) -> bool {
+        let (before, after) = self.source.inner().split_at_checked(excerpt.offset).unwrap_or_default();
+        let mut lines = before.rsplit('\n').take(2).chain(after.split('\n').take(2));
+        lines.all(|line| line.len() <= LONGEST_LINE)
     }
 }
 
@@ -100,6 +114,24 @@ mod tests {
             length: 6,
         };
         insta::assert_snapshot!(Excerpts::new("site.toml", text, vec![excerpt]).render(false));
+    }
+
+    #[test]
+    fn draws_no_line_that_nobody_could_look_at_and_nothing_that_a_terminal_obeys() {
+        let render = |text: &str| {
+            let excerpt = Excerpt {
+                sentence: "site.toml:2:1: wrong".to_owned(),
+                help: "mend it".to_owned(),
+                offset: 2,
+                length: 1,
+            };
+            Excerpts::new("site.toml", text.to_owned(), vec![excerpt]).render(false)
+        };
+        for text in [format!("a\n{}", "x".repeat(100_000)), format!("a\nb\n{}", "x".repeat(100_000))] {
+            assert_eq!(render(&text), "site.toml:2:1: wrong; mend it\n");
+        }
+        let drawn = render("a\r\n\u{1B}[2Jb = 1\n");
+        assert!(drawn.contains("?[2Jb = 1") && !drawn.contains('\u{1B}') && !drawn.contains('\r'), "{drawn}");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::time::Duration;
 use busbar_link::Endpoint;
 use busbar_profile::DateTime;
 
+use crate::faults::Faults;
 use crate::scenario::Scenario;
 
 /// 5 January 2026 at ten, after the first instant of 2000.
@@ -32,6 +33,8 @@ pub struct Config {
     pub story: bool,
     /// What happens to it, and what is expected of it.
     pub scenario: Option<Scenario>,
+    /// What goes wrong on the wires that it answers on.
+    pub faults: Option<Faults>,
     /// What the calendar of a controller that has one says at power-on. Nothing depends on it but what that controller
     /// does by its calendar: the weather, the story and the rest follow the seed and the time that has passed.
     pub epoch: DateTime,
@@ -53,6 +56,7 @@ impl Default for Config {
             pins: Vec::new(),
             story: false,
             scenario: None,
+            faults: None,
             epoch: DateTime::FIRST.plus(MONDAY_MORNING),
             connections: 128,
             idle: Duration::from_secs(300),

@@ -62,8 +62,8 @@ impl Device {
         if let Some(scenario) =
             config.scenario.as_ref().filter(|scenario| scenario.controller() != profile.key)
         {
-            let (title, controller) = (scenario.title().to_owned(), scenario.controller());
-            return Err(StartError::OtherController { title, controller, key: profile.key.clone() });
+            let (place, controller) = (scenario.place(), scenario.controller());
+            return Err(StartError::OtherController { place, controller, key: profile.key.clone() });
         }
         let (mut panel, model) = panel(profile, config)?;
         let (mut bank, mut settings) = (Bank::new(profile), Settings::of(profile));

@@ -3,6 +3,7 @@
 use std::io;
 
 use busbar_link::{Endpoint, SerialError};
+use busbar_profile::text::shown;
 use busbar_profile::{Number, SerialSettings};
 
 use crate::levers::LeverError;
@@ -59,11 +60,11 @@ pub enum StartError {
     Lever(#[from] LeverError),
     /// The scenario happens to another controller.
     #[error(
-        "the scenario \"{title}\" is for {controller}, not for {key}; imitate {controller}, or choose another one"
+        "{place}: this scenario is for {controller}, not for {key}; imitate {controller}, or choose another one"
     )]
     OtherController {
-        /// What the scenario is called.
-        title: String,
+        /// Where the scenario names its controller: file, line and column.
+        place: String,
         /// The profile that it is for.
         controller: &'static str,
         /// What was to be imitated.
@@ -133,7 +134,7 @@ pub enum StartError {
 
 /// A pinned value (`--set POINT=VALUE`) that cannot be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("cannot set {point} to `{value}`: {problem}")]
+#[error("{}", self.sentence())]
 #[non_exhaustive]
 pub struct PinError {
     /// The point as named.
@@ -149,8 +150,11 @@ pub struct PinError {
 #[non_exhaustive]
 pub enum PinProblem {
     /// The profile has no such point.
-    #[error("the controller has no such point; `busbar profile show` lists them")]
-    UnknownPoint,
+    #[error("there is no such point; {}", meant(.nearest.as_ref()))]
+    UnknownPoint {
+        /// What was perhaps meant: a point, or a setting.
+        nearest: Option<String>,
+    },
     /// The point can only be written.
     #[error("the point can only be written by a client, never read")]
     WriteOnly,
@@ -171,7 +175,7 @@ pub enum PinProblem {
         allowed: Vec<String>,
     },
     /// Not a bit of the point.
-    #[error("`{word}` is not one of its bits; give ids separated by commas, or `none`: {}", .allowed.join(", "))]
+    #[error("`{}` is not one of its bits; give ids separated by commas, or `none`: {}", shown(.word), .allowed.join(", "))]
     Bit {
         /// The word that is not.
         word: String,
@@ -205,6 +209,25 @@ pub enum PinProblem {
         /// Why.
         reason: String,
     },
+}
+
+impl PinError {
+    fn sentence(&self) -> String {
+        let Self { point, value, problem } = self;
+        match problem {
+            PinProblem::UnknownPoint { nearest } => {
+                format!("the controller has no point `{}`; {}", shown(point), meant(nearest.as_ref()))
+            }
+            _ => format!("cannot set {} to `{}`: {problem}", shown(point), shown(value)),
+        }
+    }
+}
+
+fn meant(nearest: Option<&String>) -> String {
+    match nearest {
+        Some(nearest) => format!("did you mean `{nearest}`?"),
+        None => "`busbar profile show` lists them".to_owned(),
+    }
 }
 
 pub(crate) fn listen_reason(kind: io::ErrorKind) -> String {

@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use busbar_profile::text::shown;
 use busbar_profile::vocabulary::vocabulary;
 use busbar_profile::{DataType, JoinedValue, Number, Point, Profile, Value, nearest};
 use serde::{Serialize, Serializer};
@@ -92,7 +93,7 @@ enum Place {
 #[non_exhaustive]
 pub enum FactError {
     /// The controller has nothing of that name.
-    #[error("the controller has no `{name}`; {}", meant(.nearest.as_ref()))]
+    #[error("the controller has no `{}`; {}", shown(.name), meant(.nearest.as_ref()))]
     Unknown {
         /// What was asked for.
         name: String,
@@ -123,7 +124,7 @@ impl FactError {
     pub(crate) fn parts(&self) -> (String, String) {
         match self {
             Self::Unknown { name, nearest } => {
-                (format!("the controller has no `{name}`"), meant(nearest.as_ref()))
+                (format!("the controller has no `{}`", shown(name)), meant(nearest.as_ref()))
             }
             Self::NotPlain { name, what, remedy } => (format!("`{name}` is {what}"), remedy.clone()),
         }
@@ -318,7 +319,15 @@ fn nearest_name(profile: &'static Profile, name: &str) -> Option<String> {
     }
     let signals = Subject::signals(profile).map(|subject| subject.name);
     let names: Vec<_> = signals.chain(readable().map(|point| point.id.clone())).collect();
-    nearest(name, names.iter().map(String::as_str)).map(str::to_owned)
+    let names = || names.iter().map(String::as_str);
+    nearest(name, names()).or_else(|| begun(name, names())).map(str::to_owned)
+}
+
+/// The only name that goes on from this one, such as `breaker.genset.closed` from `breaker.genset`.
+fn begun<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let goes_on = |known: &&str| known.strip_prefix(name).is_some_and(|rest| rest.starts_with('.'));
+    let mut begun = names.filter(goes_on);
+    begun.next().filter(|_| begun.next().is_none())
 }
 
 #[cfg(test)]
@@ -408,6 +417,10 @@ mod tests {
         }
         for (name, sentence) in [
             ("state.engin", "the controller has no `state.engin`; did you mean `state.engine`?"),
+            (
+                "breaker.genset",
+                "the controller has no `breaker.genset`; did you mean `breaker.genset.closed`?",
+            ),
             ("unitmode", "the controller has no `unitmode`; did you mean `unit_mode`?"),
             (
                 "warning_alarms.low_fuel_levl",

@@ -5,6 +5,11 @@
 
 use std::fmt;
 
+use busbar_profile::text::shown;
+
+/// How an event is told, and the word of the lever that it means: the mains fail, the mains return.
+const TOLD: [(&str, &str); 2] = [("fails", "failed"), ("returns", "normal")];
+
 /// One thing that can be made to happen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -67,13 +72,15 @@ impl Lever {
         Self { id, name, words, numbers: Some(Numbers { min, max, unit }) }
     }
 
-    /// A position given as text.
+    /// A position given as text; of a lever with such words `fails` means `failed`, and `returns` `normal`.
     ///
     /// # Errors
     /// The lever has no such position.
     pub fn position(&self, text: &str) -> Result<Position, LeverError> {
-        if let Some(word) = self.words.iter().find(|word| word.id == text) {
-            return Ok(Position::Word(word.id));
+        let word = |id: &str| self.words.iter().find(|word| word.id == id).map(|word| word.id);
+        let told = || TOLD.iter().find(|(told, _)| *told == text).and_then(|(_, meant)| word(meant));
+        if let Some(word) = word(text).or_else(told) {
+            return Ok(Position::Word(word));
         }
         match (text.parse::<f64>(), self.numbers) {
             (Ok(number), Some(range)) if (range.min..=range.max).contains(&number) => {
@@ -104,7 +111,7 @@ impl fmt::Display for Position {
 #[non_exhaustive]
 pub enum LeverError {
     /// The plant has no such lever.
-    #[error("the plant has no `{id}`; {}", has(.nearest.as_ref(), .known))]
+    #[error("the plant has no `{}`; {}", shown(.id), has(.nearest.as_ref(), .known))]
     Unknown {
         /// What was asked for.
         id: String,
@@ -114,7 +121,7 @@ pub enum LeverError {
         known: Vec<&'static str>,
     },
     /// The lever has no such position.
-    #[error("`{}` cannot be `{text}`; {}", .lever.id, offers(.lever))]
+    #[error("`{}` cannot be `{}`; {}", .lever.id, shown(.text), offers(.lever))]
     Position {
         /// The lever.
         lever: Lever,
@@ -154,6 +161,27 @@ mod tests {
         (0.0, 120.0),
         "kW",
     );
+
+    #[test]
+    fn an_event_is_told_as_people_tell_it() {
+        const MAINS: Lever = Lever::of_words(
+            "mains",
+            "Mains",
+            &[Word::new("normal", "There"), Word::new("failed", "Gone"), Word::new("sagging", "Low")],
+        );
+        assert_eq!(MAINS.position("fails"), Ok(Position::Word("failed")));
+        assert_eq!(MAINS.position("returns"), Ok(Position::Word("normal")));
+        for wrong in ["Fails", "fail", "sags"] {
+            assert!(MAINS.position(wrong).is_err(), "{wrong}");
+        }
+        assert!(LOAD.position("fails").is_err(), "a load has no such word");
+    }
+
+    #[test]
+    fn a_sentence_repeats_nothing_that_a_terminal_obeys() {
+        let error = LOAD.position(&format!("\u{1B}[2J{}", "9".repeat(500))).unwrap_err().to_string();
+        assert!(error.starts_with("`load` cannot be `\\u{1b}[2J999") && error.len() < 200, "{error}");
+    }
 
     #[test]
     fn a_position_is_one_of_its_words_or_a_number_in_its_range() {

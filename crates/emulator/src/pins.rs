@@ -1,14 +1,14 @@
 //! `--set POINT=VALUE`: a value given as text, checked against its point, as the registers that hold it.
 
-use busbar_profile::{BitSet, DataType, EncodeError, Number, Point, Profile, Value};
+use busbar_profile::{BitSet, DataType, EncodeError, Number, Point, Profile, Value, nearest};
 
 use crate::error::{PinError, PinProblem};
 
 /// The index of the point and its registers.
 pub(crate) fn parse(profile: &Profile, name: &str, text: &str) -> Result<(usize, Vec<u16>), PinError> {
     let refuse = |problem| PinError { point: name.to_owned(), value: text.to_owned(), problem };
-    let index = profile.point_index(name).ok_or_else(|| refuse(PinProblem::UnknownPoint))?;
-    let point = profile.points.get(index).ok_or_else(|| refuse(PinProblem::UnknownPoint))?;
+    let found = profile.point_index(name).and_then(|index| Some((index, profile.points.get(index)?)));
+    let (index, point) = found.ok_or_else(|| unknown(profile, name))?;
     if !point.access.is_readable() {
         return Err(refuse(PinProblem::WriteOnly));
     }
@@ -23,6 +23,15 @@ pub(crate) fn parse(profile: &Profile, name: &str, text: &str) -> Result<(usize,
     };
     encoded.map_err(|error| refuse(explain(point, error)))?;
     Ok((index, registers))
+}
+
+/// What there is to say of a point that the controller does not have. Whoever sets things sets settings too.
+pub(crate) fn unknown(profile: &Profile, name: &str) -> PinError {
+    let points = profile.points.iter().filter(|point| point.access.is_readable()).map(|point| &*point.id);
+    let settings = profile.settings.iter().map(|setting| &*setting.id);
+    let problem =
+        PinProblem::UnknownPoint { nearest: nearest(name, points.chain(settings)).map(str::to_owned) };
+    PinError { point: name.to_owned(), value: String::new(), problem }
 }
 
 fn value(point: &Point, text: &str) -> Result<Value, PinProblem> {
@@ -119,7 +128,7 @@ fn list<T: std::str::FromStr>(text: &str) -> Option<Vec<T>> {
 }
 
 fn hex(text: &str) -> Option<Vec<u8>> {
-    if !text.is_ascii() || !text.len().is_multiple_of(2) {
+    if !text.bytes().all(|byte| byte.is_ascii_hexdigit()) || !text.len().is_multiple_of(2) {
         return None;
     }
     (0..text.len()).step_by(2).map(|at| u8::from_str_radix(text.get(at..at + 2)?, 16).ok()).collect()

@@ -3,17 +3,21 @@
 
 use std::time::Duration;
 
+use busbar_profile::text::shown;
 use busbar_profile::{Number, Profile, Setting, nearest};
 
 /// The settings of one controller.
 #[derive(Clone, Debug)]
 pub(crate) struct Settings {
+    /// Key of the profile.
+    key: &'static str,
     values: Vec<(&'static Setting, f64)>,
 }
 
 impl Settings {
     pub(crate) fn of(profile: &'static Profile) -> Self {
-        Self { values: profile.settings.iter().map(|setting| (setting, setting.value.as_f64())).collect() }
+        let values = profile.settings.iter().map(|setting| (setting, setting.value.as_f64())).collect();
+        Self { key: &profile.key, values }
     }
 
     /// All of them, each with what it is set to.
@@ -45,6 +49,7 @@ impl Settings {
             return Err(SettingError::Unknown {
                 id: id.to_owned(),
                 nearest: nearest(id, ids()).map(str::to_owned),
+                key: self.key,
             });
         };
         let number =
@@ -62,17 +67,19 @@ impl Settings {
 #[non_exhaustive]
 pub enum SettingError {
     /// The controller has no such setting.
-    #[error("the controller has no setting `{id}`{}", .nearest.as_ref().map(|near| format!("; did you mean `{near}`?")).unwrap_or_default())]
+    #[error("the controller has no setting `{}`; {}", shown(.id), meant(.nearest.as_ref(), .key))]
     Unknown {
         /// What was asked for.
         id: String,
         /// What was perhaps meant.
         nearest: Option<String>,
+        /// Key of the controller's profile.
+        key: &'static str,
     },
     /// It cannot be set to that.
     #[error(
-        "`{}` cannot be set to `{text}`; choose a number from {} to {}{}",
-        .setting.id, .setting.min, .setting.max,
+        "`{}` cannot be set to `{}`; choose a number from {} to {}{}",
+        .setting.id, shown(.text), .setting.min, .setting.max,
         .setting.unit.as_ref().map(|unit| format!(" {unit}")).unwrap_or_default()
     )]
     Range {
@@ -81,4 +88,11 @@ pub enum SettingError {
         /// What was asked for.
         text: String,
     },
+}
+
+fn meant(nearest: Option<&String>, key: &str) -> String {
+    match nearest {
+        Some(nearest) => format!("did you mean `{nearest}`?"),
+        None => format!("docs/imitation/{key}.md lists them"),
+    }
 }

@@ -16,12 +16,12 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::time::Duration;
 
 use busbar_link::Endpoint;
+use busbar_profile::text::shown;
 use busbar_profile::{Collector, Finding, Findings, Profile, WordOrder};
 use toml::de::DeTable;
 
 pub use self::diagram::{Connection, Diagram, Node, NodeKind};
 use self::reader::Table;
-use self::words::shown;
 
 /// Where the gateway listens unless it is told otherwise: this machine only.
 pub const DEFAULT_LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);

@@ -39,6 +39,7 @@ pub mod show;
 pub mod signature;
 mod suggest;
 mod terms;
+pub mod text;
 mod units;
 mod value;
 pub mod vocabulary;

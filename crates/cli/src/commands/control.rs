@@ -22,6 +22,11 @@ pub(super) fn token() -> Result<Option<Token>, Failure> {
     }
 }
 
+/// Whether a control may be served there, which is asked before anything starts.
+pub(super) fn allow(address: SocketAddr, token: Option<&Token>) -> Result<(), Failure> {
+    control::may_listen(address, token).map_err(failure)
+}
+
 /// The controllers of a fleet that runs.
 pub(super) fn imitated(fleet: &Fleet, emulation: &Emulation) -> Vec<Imitated> {
     let members = fleet.members.iter().zip(emulation.controllers());
@@ -52,8 +57,12 @@ pub(super) async fn serve(
     token: Option<Token>,
 ) -> Result<Server, Failure> {
     let control = Control { imitated, token, site: None };
-    control::serve(address, control).await.map_err(|error| match error {
+    control::serve(address, control).await.map_err(failure)
+}
+
+fn failure(error: ServeError) -> Failure {
+    match error {
         ServeError::NoToken { .. } => Failure::Call(format!("{error} in {TOKEN}")),
         _ => Failure::Failed(format!("{error} (--control ADDR:PORT)")),
-    })
+    }
 }

@@ -6,6 +6,7 @@
 mod command;
 mod control;
 mod decode;
+mod faults;
 mod fleet;
 mod frame;
 mod guide;

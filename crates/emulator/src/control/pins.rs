@@ -12,7 +12,7 @@ use super::problem::{Json, Problem};
 use super::site::{Site, named};
 use super::types::{Pin, PinView, PointView, Set, SettingView};
 use crate::device::Device;
-use crate::error::{PinError, PinProblem};
+use crate::pins;
 
 /// The points that clients can read: each can be pinned.
 #[utoipa::path(
@@ -92,8 +92,7 @@ pub(super) async fn unpin(
     let (id, point) = named(ids)?;
     site.one(&id)?.controller.with(|device| {
         if device.profile().point(&point).is_none() {
-            let (value, problem) = (String::new(), PinProblem::UnknownPoint);
-            return Err(PinError { point, value, problem }.into());
+            return Err(pins::unknown(device.profile(), &point).into());
         }
         device.unpin(&point);
         Ok(Answer(pins_of(device)))

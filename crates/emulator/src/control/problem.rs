@@ -92,7 +92,7 @@ impl From<InjectError> for Problem {
 impl From<PinError> for Problem {
     fn from(error: PinError) -> Self {
         match error.problem {
-            PinProblem::UnknownPoint => Self::absent(error),
+            PinProblem::UnknownPoint { .. } => Self::absent(error),
             _ => Self::impossible(error),
         }
     }

@@ -13,7 +13,7 @@ use crate::settings;
 
 use super::readings::Readings;
 use super::sequence::{Failures, Trip};
-use super::watch::{Class, Situation, Watches};
+use super::watch::{Class, EMERGENCY_STOP_INPUT, Situation, Watches};
 
 const FAIL_TO_START: u16 = 98;
 const FAIL_TO_STOP: u16 = 99;
@@ -21,8 +21,8 @@ const GENSET_BREAKER: BreakerBits =
     BreakerBits { to_close: (Class::LoadDump, 111), to_open: (Class::Warning, 112) };
 const MAINS_BREAKER: BreakerBits =
     BreakerBits { to_close: (Class::Warning, 113), to_open: (Class::LoadDump, 114) };
-const NO_MAINS_FREQUENCY: u16 = 121;
-const MAINS_FREQUENCY_FAIL: u16 = 122;
+/// What tells a genset beside the mains that these are gone, or must be left.
+const G59: std::ops::RangeInclusive<u16> = 121..=125;
 const SYNCHRONIZATION_FAIL: u16 = 128;
 /// Those of services 2 and 3 follow.
 pub(super) const SERVICE_1_REQUEST: u16 = 118;
@@ -40,6 +40,9 @@ pub(super) struct Alarms {
     horn: Duration,
     /// An alarm has come in this step.
     new: bool,
+    /// What of [`G59`] is so now, and whether some of it has come in this step.
+    losses: BitSet,
+    loses_mains: bool,
     /// By class, as everything below.
     shown: [BitSet; 3],
     /// Whose cause is there, whether shown for longer or not.
@@ -57,6 +60,8 @@ impl Alarms {
             horn_time: Duration::ZERO,
             horn: Duration::ZERO,
             new: false,
+            losses: BitSet::EMPTY,
+            loses_mains: false,
             shown: [BitSet::EMPTY; 3],
             standing: [BitSet::EMPTY; 3],
             injected: [BitSet::EMPTY; 3],
@@ -94,7 +99,11 @@ impl Alarms {
             }),
             self.mains_breaker.alarm(MAINS_BREAKER),
         ];
-        for (class, bit) in self.watches.active().chain(of_breakers.into_iter().flatten()) {
+        let watched = self.watches.active().map(|(class, bit)| match situation.lenient {
+            true if bit != EMERGENCY_STOP_INPUT => (Class::Warning, bit),
+            _ => (class, bit),
+        });
+        for (class, bit) in watched.chain(of_breakers.into_iter().flatten()) {
             standing[class as usize].insert(bit);
         }
         self.standing = standing;
@@ -135,6 +144,11 @@ impl Alarms {
         self.new
     }
 
+    /// Whether the last step has brought a cause to leave the mains, shown for longer or not.
+    pub(super) fn loses_mains(&self) -> bool {
+        self.loses_mains
+    }
+
     pub(super) fn of(&self, class: Class) -> BitSet {
         self.shown[class as usize]
     }
@@ -164,6 +178,11 @@ impl Alarms {
                 Class::Warning => self.shown[index].intersection(&latched_warnings()),
             };
             self.new |= !now.difference(&self.shown[index]).is_empty();
+            if class == Class::Warning {
+                let losses = now.intersection(&G59.collect());
+                self.loses_mains = !losses.difference(&self.losses).is_empty();
+                self.losses = losses;
+            }
             self.shown[index] = now.union(&stays);
         }
         if self.new {
@@ -209,8 +228,7 @@ impl BreakerWatch {
 /// Warnings that stay until they are reset.
 fn latched_warnings() -> BitSet {
     let of_breakers = [GENSET_BREAKER.to_open.1, MAINS_BREAKER.to_close.1];
-    let of_events = [FAIL_TO_STOP, NO_MAINS_FREQUENCY, MAINS_FREQUENCY_FAIL, SYNCHRONIZATION_FAIL];
-    of_breakers.into_iter().chain(of_events).collect()
+    of_breakers.into_iter().chain([FAIL_TO_STOP, SYNCHRONIZATION_FAIL]).chain(G59).collect()
 }
 
 fn of_sequence(failures: Failures) -> [BitSet; 3] {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::contacts::Contacts;
 use super::mains::Mains;
 use super::operation::Operation;
 use super::readings::Readings;
@@ -42,6 +43,7 @@ impl Peak {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Causes<'a> {
     pub(super) settings: &'a Settings,
+    pub(super) contacts: Contacts,
     pub(super) mains: &'a Mains,
     /// The mains are good, and their breaker obeys.
     pub(super) mains_usable: bool,
@@ -54,10 +56,14 @@ pub(super) struct Causes<'a> {
 impl Causes<'_> {
     /// The first cause in the order of their weight decides.
     pub(super) fn auto(self) -> Demand {
+        if self.contacts.auto_start_disabled && !self.operation.is_committed() {
+            return Demand::REST;
+        }
         if let Some(backup) = self.backup() {
             return backup;
         }
         match () {
+            () if self.contacts.force_to_start => Demand::ON_LOAD,
             () if self.remote_start && self.settings.power_export => Demand::EXPORTING,
             () if self.remote_start => Demand::ON_LOAD,
             () if self.exerciser && self.settings.exerciser_on_load => Demand::ON_LOAD,
@@ -74,6 +80,7 @@ impl Causes<'_> {
     pub(super) fn backup(self) -> Option<Demand> {
         match self.mains_usable {
             false => Some(Demand::ON_LOAD),
+            true if self.contacts.restore_inhibited && self.operation.has_the_load() => Some(Demand::ON_LOAD),
             true if self.mains.is_trusted() || !self.operation.is_committed() => None,
             true if self.operation.carries_load() => Some(Demand::ON_LOAD),
             true => Some(Demand { engine: true, source: Source::Mains }),
@@ -123,6 +130,7 @@ mod tests {
         let auto = |mains: &Mains, operation| {
             let causes = Causes {
                 settings: &settings,
+                contacts: Contacts::default(),
                 mains,
                 mains_usable: mains.is_healthy(),
                 remote_start: false,

@@ -3,6 +3,7 @@
 
 use crate::bank::Bank;
 use crate::lcd::{COLUMNS, Canvas};
+use crate::plant::Synchronism;
 use crate::waveform::{Analysis, SAMPLES, order};
 
 use super::DatakomD;
@@ -202,21 +203,21 @@ impl Page<'_> {
 
     fn synchroscope(&mut self, unit: &DatakomD) {
         self.title("Synchroscope", "1/1");
-        let plant = &unit.plant;
-        let (mains, genset) = (&plant.mains, &plant.genset);
-        for (line, what, value, unit) in [
-            (2, "Slip", genset.frequency - mains.frequency, "Hz"),
-            (3, "Voltage", genset.average_voltage() - mains.average_voltage(), "V"),
-            (4, "Angle", plant.angle(), "deg"),
-        ] {
+        let Synchronism { live, angle, slip, voltage, .. } = unit.plant.synchronism();
+        for (line, what, value, unit) in
+            [(2, "Slip", slip, "Hz"), (3, "Voltage", voltage, "V"), (4, "Angle", angle, "deg")]
+        {
             self.canvas.text(line, 0, what);
-            self.canvas.text_right(line, &format!("{value:+.1} {unit}"));
+            let text = if live { format!("{value:+.1} {unit}") } else { "---".to_owned() };
+            self.canvas.text_right(line, &text);
         }
-        // The needle moves over half a turn to each side of the middle.
         self.canvas.frame(4, 48, 121, 9);
         self.canvas.fill(64, 45, 1, 3);
-        let needle = (64.0 + plant.angle() / 180.0 * 58.0).round() as usize;
-        self.canvas.fill(needle.saturating_sub(1), 49, 3, 7);
+        if live {
+            // The needle moves over half a turn to each side of the middle.
+            let needle = (64.0 + angle / 180.0 * 58.0).round() as usize;
+            self.canvas.fill(needle.saturating_sub(1), 49, 3, 7);
+        }
     }
 
     /// The trace of the selected channel, as high as it fits.
@@ -299,8 +300,10 @@ impl Page<'_> {
         self.canvas.text(3, 0, &format!("MAC {mac}"));
         let imei = String::from_utf8_lossy(&identity.imei);
         self.canvas.text(4, 0, &format!("IMEI {}", imei.trim_end_matches('\0')));
-        self.row(5, "Lat", 10594, 0, "");
-        self.row(6, "Lon", 10596, 0, "");
+        for (line, axis, address) in [(5, "Lat", 10594), (6, "Lon", 10596)] {
+            self.canvas.text(line, 0, axis);
+            self.canvas.text_right(line, &format!("{:.5}", self.number(address) / 100_000.0));
+        }
         self.row(7, "Alt", 10598, 0, "m");
     }
 

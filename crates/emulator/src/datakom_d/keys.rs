@@ -86,8 +86,10 @@ impl DatakomD {
             (true, false) => Press::Long,
             (false, false) => Press::Short,
         };
-        // Whoever touches the front has heard the horn.
-        self.alarms.mute();
+        if (0..=DOWN).any(pressed) {
+            // Whoever touches the front has heard the horn.
+            self.alarms.mute();
+        }
         if pressed(0) {
             return self.press_stop();
         }
@@ -95,7 +97,9 @@ impl DatakomD {
             match key {
                 1..=4 => self.press_mode(key),
                 5 => {
-                    let ready = self.sequence.operation().is_up_to_speed() && self.genset_healthy();
+                    let ready = self.sequence.operation().is_up_to_speed()
+                        && self.genset_healthy()
+                        && !self.contacts.loading_inhibited;
                     self.press_breaker(Source::Genset, ready);
                 }
                 6 => self.press_breaker(Source::Mains, self.mains.is_healthy()),
@@ -111,14 +115,27 @@ impl DatakomD {
                 self.run_wanted = true;
             }
             (1, Front::ManualAndRun) => {
-                // The mode changes, a running engine goes on running.
-                let running = self.readings.running;
-                self.enter(Mode::Run);
-                self.run_wanted |= running;
+                // The mode changes, and nothing else: a running engine goes on running, with the load that it has.
+                let (running, source) = (self.readings.running, self.feeding());
+                if self.enter(Mode::Run) {
+                    (self.run_wanted, self.source) = (running, source);
+                }
             }
-            (2, _) => self.enter(Mode::Auto),
-            (3, _) => self.enter(Mode::Test),
+            (2, _) => {
+                self.enter(Mode::Auto);
+            }
+            (3, _) => {
+                self.enter(Mode::Test);
+            }
             _ => {}
+        }
+    }
+
+    /// What feeds the load now, as far as the genset has to do with it.
+    fn feeding(&self) -> Source {
+        match self.sequence.operation().carries_load() {
+            true => self.demand().source,
+            false => Source::Mains,
         }
     }
 
@@ -134,8 +151,14 @@ impl DatakomD {
         if self.mode != Mode::Run {
             return;
         }
-        if self.source == own {
-            self.source = Source::Nothing;
+        let (genset, mains) = (self.controls.genset_breaker, self.controls.mains_breaker);
+        let (driven, left) = match own {
+            Source::Genset => (genset, if mains { Source::Mains } else { Source::Nothing }),
+            _ => (mains, if genset { Source::Genset } else { Source::Nothing }),
+        };
+        // One that is on its way turns round.
+        if driven || ready && self.source == own {
+            self.source = left;
         } else if ready {
             self.source = own;
         }
@@ -163,11 +186,14 @@ impl DatakomD {
         self.alarms.reset();
     }
 
-    fn enter(&mut self, mode: Mode) {
-        if mode != self.mode {
+    /// Changes the mode; false where it is the one already.
+    fn enter(&mut self, mode: Mode) -> bool {
+        let changes = mode != self.mode;
+        if changes {
             self.mode = mode;
             self.run_wanted = false;
             self.source = Source::Mains;
         }
+        changes
     }
 }

@@ -53,6 +53,11 @@ impl Mains {
         }
     }
 
+    /// Takes them for failed at once: something else than their limits says so.
+    pub(super) fn lose(&mut self) {
+        (self.healthy, self.doubted, self.waiting) = (false, Duration::ZERO, self.settings.waiting);
+    }
+
     /// Not failed.
     pub(super) fn is_healthy(&self) -> bool {
         self.healthy

@@ -4,10 +4,13 @@
 //! stands in `docs/imitation/datakom-d.md`.
 
 mod alarms;
+mod contacts;
 mod demand;
 mod display;
+mod gps;
 mod identity;
 mod keys;
+mod loss_of_mains;
 mod mains;
 mod operation;
 mod readings;
@@ -27,7 +30,7 @@ use std::time::Duration;
 use crate::bank::Bank;
 use crate::levers::{Lever, Position};
 use crate::panel::Panel;
-use crate::plant::{self, Controls, Plant, Tank};
+use crate::plant::{Controls, Plant, Tank};
 use crate::random::Random;
 use crate::rules::Refusals;
 use crate::waveform::Distortion;
@@ -35,11 +38,14 @@ use crate::waveform::Distortion;
 use busbar_modbus::ExceptionCode;
 
 use alarms::{Alarms, Breakers};
+use contacts::Contacts;
 use demand::{Causes, Peak};
+use gps::Gps;
 use identity::Identity;
 use keys::Menu;
+use loss_of_mains::LossOfMains;
 use mains::Mains;
-use operation::Operation::{MainsBreakerTimer, WaitBeforeFuel};
+use operation::Operation::{Exporting, MainsBreakerTimer, WaitBeforeFuel};
 use readings::Readings;
 use regulation::Regulation;
 use sequence::{Demand, Sensed, Sequence, Source};
@@ -63,6 +69,8 @@ pub(crate) struct DatakomD {
     settings: Settings,
     readings: Readings,
     mains: Mains,
+    loss_of_mains: LossOfMains,
+    contacts: Contacts,
     sequence: Sequence,
     regulation: Regulation,
     alarms: Alarms,
@@ -70,6 +78,7 @@ pub(crate) struct DatakomD {
     distortion: Distortion,
     random: Random,
     identity: Identity,
+    gps: Gps,
     mode: Mode,
     /// RUN was pressed: the engine is wanted in the manual mode.
     run_wanted: bool,
@@ -117,12 +126,15 @@ impl DatakomD {
             settings: Settings::default(),
             readings: Readings::of(&plant, 0.0),
             mains: Mains::good(),
+            loss_of_mains: LossOfMains::default(),
+            contacts: Contacts::default(),
             sequence: Sequence::new((hours / 3.1) as u32),
             regulation: Regulation::new(&mut plant),
             alarms: Alarms::new(),
             peak: Peak::default(),
             distortion: Distortion::new(&mut random),
             identity: Identity::new(model, code, &mut random),
+            gps: Gps::new(seed ^ 0x6B5),
             mode: Mode::Auto,
             run_wanted: false,
             source: Source::Mains,
@@ -145,8 +157,20 @@ impl DatakomD {
     }
 
     fn demand(&self) -> Demand {
+        let wanted = self.wish();
+        match wanted.source {
+            Source::Genset | Source::PeakLopping | Source::Exporting if self.contacts.loading_inhibited => {
+                Demand { source: Source::Mains, ..wanted }
+            }
+            _ => wanted,
+        }
+    }
+
+    /// What the mode asks for.
+    fn wish(&self) -> Demand {
         let causes = Causes {
             settings: &self.settings,
+            contacts: self.contacts,
             mains: &self.mains,
             mains_usable: self.mains_usable(),
             remote_start: self.readings.remote_start,
@@ -155,6 +179,8 @@ impl DatakomD {
             operation: self.sequence.operation(),
         };
         match self.mode {
+            // A mains breaker that was opened by hand stays open.
+            Mode::Run if self.alarms.trip().is_some() => Demand { engine: false, source: self.source },
             _ if self.alarms.trip().is_some() => Demand::REST,
             Mode::Stop => Demand::REST,
             Mode::Run => {
@@ -218,12 +244,15 @@ impl DatakomD {
     /// Looks at the plant and judges it.
     fn look(&mut self, dt: Duration) {
         self.readings = Readings::of(&self.plant, self.pumping.as_secs_f64());
+        self.loss_of_mains.step(dt.as_secs_f64(), &mut self.readings, self.plant.is_jolting());
         self.mains.step(dt, &self.plant.mains, self.readings.mains_in_order);
         self.peak.step(dt, &self.readings, &self.settings);
         let situation = Situation {
             running: self.readings.running,
             protected: self.sequence.operation().is_up_to_speed(),
             parallel: self.readings.side_by_side,
+            exporting: self.sequence.operation() == Exporting,
+            lenient: self.contacts.protections_disabled,
         };
         let breakers = Breakers {
             controls: &self.controls,
@@ -231,6 +260,9 @@ impl DatakomD {
             mains_closed: self.plant.mains_breaker.closed,
         };
         self.alarms.step(dt, &self.readings, situation, &breakers, self.sequence.failures);
+        if self.alarms.loses_mains() && situation.parallel {
+            self.mains.lose();
+        }
         if self.alarms.is_new() {
             self.menu.show_alarms();
         }
@@ -240,6 +272,7 @@ impl DatakomD {
     fn act(&mut self, dt: Duration) {
         if let Some(trip) = self.alarms.trip() {
             self.sequence.trip(trip);
+            self.forget_wishes();
         }
         let (demand, sensed) = (self.demand(), self.sensed());
         self.sequence.step(dt, demand, sensed);
@@ -250,6 +283,14 @@ impl DatakomD {
             fuel_pump: self.fuel_pump,
             ..self.sequence.controls(demand, sensed)
         };
+    }
+
+    /// What was asked for by hand is not done later by itself, when the alarm that forbade it has been reset.
+    fn forget_wishes(&mut self) {
+        self.run_wanted = false;
+        if self.source != Source::Nothing {
+            self.source = Source::Mains;
+        }
     }
 
     /// Switches the heater, the pump and the consumers, each with its hysteresis.
@@ -285,6 +326,7 @@ impl Panel for DatakomD {
         self.scene = if self.story { Scene::at(self.plant.time) } else { Scene::NOTHING };
         self.plant.tank.other_draw = self.scene.fuel_draw;
         self.distortion.step(seconds, &mut self.random);
+        self.gps.step(seconds);
         if self.is_silent() {
             self.restarting = self.restarting.saturating_sub(dt);
             self.controls =
@@ -337,15 +379,17 @@ impl Panel for DatakomD {
     }
 
     fn levers(&self) -> &'static [Lever] {
-        plant::LEVERS
+        contacts::LEVERS
     }
 
     fn lever(&self, id: &str) -> Option<Position> {
-        self.plant.lever(id)
+        self.contacts.lever(id).or_else(|| self.plant.lever(id))
     }
 
     fn pull(&mut self, id: &str, to: Position) {
-        self.plant.pull(id, to);
+        if !self.contacts.pull(id, to) {
+            self.plant.pull(id, to);
+        }
     }
 
     fn genset(&mut self) -> Option<&mut Plant> {

@@ -59,6 +59,11 @@ impl Operation {
         )
     }
 
+    /// The genset carries the load alone.
+    pub(super) fn has_the_load(self) -> bool {
+        matches!(self, OnLoad | SlaveOnLoad)
+    }
+
     /// The genset is led to the mains' frequency, voltage and angle.
     pub(super) fn is_synchronizing(self) -> bool {
         matches!(self, Synchronizing | SynchronizingBack)

@@ -48,6 +48,9 @@ pub(super) struct Readings {
     pub(super) mains_in_order: bool,
     /// Both breakers are closed.
     pub(super) side_by_side: bool,
+    /// Hz a second of the mains, and degrees by which the voltage has jumped; see [`super::loss_of_mains`].
+    pub(super) rocof: f64,
+    pub(super) vector_shift: f64,
 
     pub(super) battery: [f64; 2],
     pub(super) charge: f64,
@@ -94,6 +97,7 @@ impl Readings {
             emergency_stop: plant.emergency_stop,
             remote_start: plant.remote_start,
             pumping,
+            ..Self::default()
         }
     }
 

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use crate::plant::{HERTZ_PER_RPM, Plant, RATED_KVAR, RATED_KW, RATED_RPM, RATED_VOLTAGE};
+use crate::plant::{HERTZ_PER_RPM, Plant, RATED_KVAR, RATED_KW, RATED_RPM, RATED_VOLTAGE, Synchronism};
 
 use super::operation::Operation::{self, *};
 use super::settings::Settings;
@@ -143,9 +143,9 @@ fn missing_alone(operation: Operation, plant: &Plant) -> (f64, f64) {
 }
 
 fn agree(plant: &Plant) -> bool {
-    let (mains, genset) = (&plant.mains, &plant.genset);
-    let live = mains.average_voltage().min(genset.average_voltage()) > 100.0;
-    live && plant.angle().abs() < ANGLE_WINDOW
-        && (mains.frequency - genset.frequency).abs() < SLIP_WINDOW
-        && (mains.average_voltage() - genset.average_voltage()).abs() < VOLTAGE_WINDOW
+    let Synchronism { live, angle, slip, voltage, same_order } = plant.synchronism();
+    live && same_order
+        && angle.abs() < ANGLE_WINDOW
+        && slip.abs() < SLIP_WINDOW
+        && voltage.abs() < VOLTAGE_WINDOW
 }

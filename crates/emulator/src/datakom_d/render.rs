@@ -1,5 +1,7 @@
 //! From the unit to its registers, in the manual's order; the addresses are the manual's.
 
+use std::f64::consts::TAU;
+
 use crate::bank::Bank;
 use crate::plant::{Feed, RATED_KVAR, RATED_KW};
 use crate::waveform::{Analysis, Shape};
@@ -191,23 +193,27 @@ fn harmonics(unit: &DatakomD, analysis: &Analysis, bank: &mut Bank) {
 fn selected(unit: &DatakomD) -> Analysis {
     let (mains, genset) = (&unit.plant.mains, &unit.plant.genset);
     let phase = usize::from(unit.channel % 3);
-    let (shape, rms, line_to_line) = match unit.channel {
-        0..=2 => (Shape::MainsVoltage, mains.voltage[phase], false),
-        3..=5 => (Shape::GensetVoltage, genset.voltage[phase], false),
-        6..=8 => (Shape::MainsVoltage, mains.line_voltage()[phase], true),
-        9..=11 => (Shape::GensetVoltage, genset.line_voltage()[phase], true),
-        12..=14 => (Shape::Current, mains.current()[phase], false),
-        15..=17 => (Shape::Current, genset.current()[phase], false),
-        18 => (Shape::NeutralCurrent, mains.neutral_current(), false),
-        _ => (Shape::NeutralCurrent, genset.neutral_current(), false),
+    let (shape, feed, rms) = match unit.channel {
+        0..=2 => (Shape::MainsVoltage, mains, mains.voltage[phase]),
+        3..=5 => (Shape::GensetVoltage, genset, genset.voltage[phase]),
+        6..=8 => (Shape::MainsVoltage, mains, mains.line_voltage()[phase]),
+        9..=11 => (Shape::GensetVoltage, genset, genset.line_voltage()[phase]),
+        12..=14 => (Shape::Current, mains, mains.current()[phase]),
+        15..=17 => (Shape::Current, genset, genset.current()[phase]),
+        18 => (Shape::NeutralCurrent, mains, mains.neutral_current()),
+        _ => (Shape::NeutralCurrent, genset, genset.neutral_current()),
     };
+    let line_to_line = (6..=11).contains(&unit.channel);
+    // Two phases that have changed places follow each other the other way round.
+    let order = if feed.phase_order_wrong { -1.0 } else { 1.0 };
     // A line voltage leads its first phase by a twelfth of a turn, a current lags by its power factor.
     let within = match shape {
-        Shape::Current | Shape::NeutralCurrent => 0.075,
-        _ if line_to_line => -1.0 / 12.0,
+        Shape::Current => feed.reactive[phase].atan2(feed.active[phase]) / TAU,
+        Shape::NeutralCurrent => feed.total_reactive().atan2(feed.total_active()) / TAU,
+        _ if line_to_line => -order / 12.0,
         _ => 0.0,
     };
-    unit.distortion.analyse(shape, rms, phase as f64 / 3.0 + within, line_to_line)
+    unit.distortion.analyse(shape, rms, order * phase as f64 / 3.0 + within, line_to_line)
 }
 
 fn state(unit: &DatakomD, bank: &mut Bank) {
@@ -240,8 +246,7 @@ fn counters(unit: &DatakomD, bank: &mut Bank) {
 
 fn identity(unit: &DatakomD, bank: &mut Bank) {
     let identity = &unit.identity;
-    // The manual gives no format: 1/100 000 degree and metres.
-    for (address, value) in [(10594, 4_821_000), (10596, 1_637_200), (10598, 186)] {
+    for (address, value) in [10594, 10596, 10598].into_iter().zip(unit.gps.fix()) {
         bank.integer(address, value);
     }
     bank.code(10609, identity.code);

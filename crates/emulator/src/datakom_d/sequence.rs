@@ -172,12 +172,18 @@ impl Sequence {
         if let Some((_, since)) = &mut self.tripping {
             *since += dt;
         }
+        // A load that cannot be moved whole is left with its rest.
+        let late = self.timer.is_zero();
         self.ready |= match self.operation {
-            TransferToGenset => sensed.mains_unloaded,
-            TransferToMains => sensed.genset_unloaded,
+            TransferToGenset => sensed.mains_unloaded || late,
+            TransferToMains => sensed.genset_unloaded || late,
             SynchronizingBack => sensed.in_step,
             _ => false,
         };
+        if self.operation.is_up_to_speed() && !sensed.turning {
+            // An engine that stands carries nothing, whatever its protections are set to.
+            self.trip(Trip::LoadDump);
+        }
         self.judge(demand, sensed);
         if let Some(next) = self.next(demand, sensed) {
             let starting = matches!(self.operation, Cranking | IdleSpeed | Heating);
@@ -265,15 +271,17 @@ impl Sequence {
 
     fn next_of_start(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
         match self.operation {
+            AtRest if sensed.turning => Some(Stopping),
             AtRest => demand.engine.then_some(WaitBeforeFuel),
             WaitBeforeFuel | Preheat | WaitOilFlashOff if !demand.engine => Some(AtRest),
             WaitBeforeFuel => self.after(Preheat),
             Preheat => self.after(WaitOilFlashOff),
             WaitOilFlashOff => self.after(Cranking),
-            Cranking if sensed.running => Some(IdleSpeed),
+            CrankRest | Cranking if sensed.running => Some(IdleSpeed),
             _ if !demand.engine => Some(Stopping),
             Cranking => self.after(self.next_attempt()),
-            _ => self.after(Cranking),
+            // The starter's pinion meets a flywheel that stands.
+            _ => self.after(Cranking).filter(|_| !sensed.turning),
         }
     }
 
@@ -288,6 +296,7 @@ impl Sequence {
 
     fn next_to_genset(&self, demand: Demand, sensed: Sensed) -> Option<Operation> {
         match self.operation {
+            OffLoad if !sensed.turning => Some(Stopping),
             OffLoad if !demand.engine => Some(StopWithCooldown),
             OffLoad => self.take_load(demand, sensed),
             Synchronizing if !(demand.on_load() || demand.parallel()) || !sensed.mains_healthy => {
@@ -301,6 +310,7 @@ impl Sequence {
             }
             GensetBreakerActivation if self.in_parallel && demand.parallel() => None,
             _ if !demand.on_load() => Some(away(demand, sensed)),
+            GensetBreakerTimer if !sensed.genset_healthy => Some(OffLoad),
             GensetBreakerTimer => self.after(GensetBreakerActivation),
             _ => None,
         }
@@ -444,6 +454,7 @@ impl Sequence {
             IdleSpeed => settings.idle,
             Heating => settings.heating,
             Synchronizing | SynchronizingBack => settings.synchronizing,
+            TransferToGenset | TransferToMains => settings.load_transfer,
             GensetBreakerActivation | MainsBreakerActivation => settings.breaker_fail,
             GensetBreakerTimer => settings.genset_breaker,
             MainsBreakerTimer => settings.mains_breaker,

@@ -27,6 +27,7 @@ pub(super) struct Settings {
     pub(super) synchronizing: Duration,
     /// kW a second.
     pub(super) load_ramp: f64,
+    pub(super) load_transfer: Duration,
 
     pub(super) mains: MainsSettings,
 
@@ -93,6 +94,7 @@ impl Settings {
             soft_transfer: settings.is_on("soft_transfer"),
             synchronizing: seconds("synchronizing_time"),
             load_ramp: number("load_ramp"),
+            load_transfer: seconds("load_transfer_time"),
             mains: MainsSettings::of(settings),
             emergency_backup: settings.is_on("emergency_backup"),
             slave: settings.is_on("slave_unit"),

@@ -67,6 +67,8 @@ fn output_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16
     let hot = plant.engine.coolant > COOLING_FROM;
     let (genset, mains) = (&plant.genset_breaker, &plant.mains_breaker);
     let calls_others = unit.calls_others();
+    let (add, shed) = unit.settings.load_shedding;
+    let load = unit.readings.genset_active;
     // A second on, a second off.
     let flashing = shown.count() > 0 && plant.time % 2.0 < 1.0;
     [
@@ -95,14 +97,15 @@ fn output_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16
         (25, running),
         (27, calls_others),
         (33, unit.shedding),
-        (35, unit.shedding),
+        (34, genset.closed && load < add),
+        (35, genset.closed && load > shed),
     ]
 }
 
 fn state_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16, bool)> {
     let operation = unit.sequence.operation();
     let running = unit.readings.running;
-    let genset_healthy = unit.genset_healthy();
+    let (genset_healthy, contacts) = (unit.genset_healthy(), unit.contacts);
     let (exercising, mode) = (unit.is_exercising(), unit.mode);
     let tripped = shown.tripped();
     [
@@ -112,13 +115,13 @@ fn state_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16,
         (38, shown.due[2]),
         (39, shown.contains(MAINS_PHASE_ORDER)),
         (40, shown.contains(GENSET_PHASE_ORDER)),
-        (41, mode == Mode::Auto && !tripped),
+        (41, mode == Mode::Auto && !tripped && !contacts.auto_start_disabled),
         (42, exercising),
         (43, exercising && mode == Mode::Auto),
         (44, !unit.mains.is_healthy()),
         (46, running),
         (47, genset_healthy),
-        (48, running && operation.is_up_to_speed()),
+        (48, operation.is_up_to_speed()),
         (49, unit.readings.oil_pressure.is_some_and(|bar| bar > OIL_PRESSURE_OK)),
         (50, !shown.shutdown.is_empty()),
         (51, !shown.load_dump.is_empty()),
@@ -138,8 +141,13 @@ fn state_flags(unit: &DatakomD, shown: &Shown) -> impl IntoIterator<Item = (u16,
         (65, operation.is_synchronizing()),
         (66, matches!(operation, StopWithCooldown | CoolingDown)),
         (67, matches!(operation, IdleBeforeStop | ImmediateStop | Stopping)),
+        (68, contacts.protections_disabled),
         (69, unit.readings.remote_start),
-        (78, operation == OnLoad),
+        (70, contacts.auto_start_disabled),
+        (71, contacts.force_to_start),
+        (72, contacts.restore_inhibited),
+        (73, contacts.loading_inhibited),
+        (78, !unit.settings.slave),
         (79, unit.calls_others()),
         (108, unit.readings.mains_alive),
     ]
@@ -204,6 +212,7 @@ fn inputs_and_outputs(unit: &DatakomD, bank: &mut Bank) {
         ]
         .map(u8::from),
     );
+    inputs[5..10].copy_from_slice(&unit.contacts.all().map(u8::from));
     bank.codes(INPUTS, &inputs);
 
     let outputs = [

@@ -26,6 +26,8 @@ enum Armed {
     Protected,
     /// While genset and mains feed one busbar.
     Parallel,
+    /// The same, and nothing is to be exported.
+    Importing,
 }
 
 /// What is so at this moment.
@@ -34,6 +36,9 @@ pub(super) struct Situation {
     pub(super) running: bool,
     pub(super) protected: bool,
     pub(super) parallel: bool,
+    pub(super) exporting: bool,
+    /// What would trip the genset only warns.
+    pub(super) lenient: bool,
 }
 
 impl Situation {
@@ -43,6 +48,7 @@ impl Situation {
             Armed::Running => self.running,
             Armed::Protected => self.protected,
             Armed::Parallel => self.parallel,
+            Armed::Importing => self.parallel && !self.exporting,
         }
     }
 }
@@ -86,12 +92,12 @@ const fn rule(
 }
 
 use After::{Seconds, Setting};
-use Armed::{Always, Parallel, Protected, Running};
+use Armed::{Always, Importing, Parallel, Protected, Running};
 use Class::{LoadDump, Shutdown, Warning};
 use Limit::{Above, Below, True};
 
 /// The emergency stop button is wired to the fourth input on board.
-const EMERGENCY_STOP_INPUT: u16 = 3;
+pub(super) const EMERGENCY_STOP_INPUT: u16 = 3;
 pub(super) const MAINS_PHASE_ORDER: u16 = 110;
 
 #[rustfmt::skip]
@@ -141,6 +147,9 @@ const RULES: &[Rule] = &[
     rule(121, Warning, Parallel, True, Seconds(0.0), |r| flag(!r.mains_alive)),
     rule(122, Warning, Parallel, Below("mains_low_frequency", 0.2), Seconds(0.2), |r| Some(r.mains_frequency).filter(|_| r.mains_alive)),
     rule(122, Warning, Parallel, Above("mains_high_frequency", 0.2), Seconds(0.2), |r| Some(r.mains_frequency).filter(|_| r.mains_alive)),
+    rule(123, Warning, Importing, Above("g59_reverse_power", 2.0), Seconds(5.0), |r| Some(-r.mains_active)),
+    rule(124, Warning, Parallel, Above("g59_rocof", 0.02), Seconds(0.2), |r| Some(r.rocof)),
+    rule(125, Warning, Parallel, Above("g59_vector_shift", 0.0), Seconds(0.0), |r| Some(r.vector_shift)),
     rule(129, Shutdown, Running, True, Setting("pickup_loss_delay"), |r| flag(r.pickup <= 0.0)),
     rule(137, Warning, Always, Above("fuel_pump_time", 0.0), Seconds(0.0), |r| Some(r.pumping)),
     rule(140, Warning, Always, Below("low_battery_warning", 0.5), Seconds(10.0), |r| Some(r.battery[1])),
@@ -273,6 +282,7 @@ mod tests {
             Running => "engine running",
             Protected => "protections live",
             Parallel => "both breakers closed",
+            Importing => "both breakers closed, not in 15",
         };
         let limit = match rule.limit {
             Below(id, _) => format!("below `{id}`"),

@@ -5,6 +5,7 @@ use std::time::Duration;
 use busbar_profile::BitSet;
 
 use super::ecu::Ecu;
+use super::mains::is_order_wrong;
 use super::measures::Measures;
 use super::operation::Operation;
 use super::parameters::Parameters;
@@ -81,7 +82,6 @@ pub(super) struct Contacts {
     pub(super) emergency_stop: bool,
     /// Input 4.
     pub(super) charger_failed: bool,
-    pub(super) mains_order_wrong: bool,
     pub(super) mains_contactor: bool,
     pub(super) service_due: bool,
     /// The other genset of the busbar does not answer, though it should.
@@ -186,29 +186,36 @@ impl Live {
         match self {
             Self::Always => true,
             Self::NotCranking => !sequence.is_cranking(),
+            Self::Fuelled => sequence.is_committed(),
             Self::UpToSpeed => sequence.is_up_to_speed(),
         }
     }
 }
 
 /// What is so or not, without a limit.
-fn conditions(view: &View<'_>) -> [(Word, u16, bool); 21] {
+fn conditions(view: &View<'_>) -> [(Word, u16, bool); 22] {
     let (failures, options, site) = (view.sequence.failures, &view.set.options, view.site);
     let tripped = view.protections.tripped();
+    let orders_matter = !view.set.mains.any_order;
     let on_load = view.sequence.operation() == Operation::LoadOnGenset;
     [
         (Shutdown1, 2, site.emergency_stop),
         (Shutdown2, 0, failures.to_stop),
         (Shutdown2, 1, failures.to_start),
-        (Shutdown2, 11, view.ecu.silence() >= view.set.timers.ecu_silence),
+        (
+            Shutdown2,
+            5,
+            is_order_wrong(&view.measures.genset) && orders_matter && view.sequence.is_up_to_speed(),
+        ),
+        (Shutdown2, 11, view.ecu.is_missed(view.set.timers.ecu_silence)),
         (Shutdown2, 14, site.partner_missing && !options.without_partner),
         (Warning1, ECU_WARNING, view.ecu.warns()),
         (Warning1, 12, options.genset_on_load_warning && on_load),
         (Warning1, 13, options.mains_on_load_warning && site.mains_contactor),
         (Warning1, 14, site.service_due && view.set.service.warns),
         (Warning2, 4, site.charger_failed),
-        (Warning2, 8, failures.to_synchronize),
-        (Warning3, 0, site.mains_order_wrong && !view.set.mains.any_order),
+        (Warning2, 8, failures.to_synchronize || failures.out_of_step),
+        (Warning3, 0, is_order_wrong(&view.measures.mains) && orders_matter),
         (Warning3, 4, view.regulation.exciter_failed(view.set)),
         (Warning3, 5, view.regulation.governor_failed(view.set)),
         (Warning3, 8, failures.mains_in_parallel || !tripped.is_empty()),
@@ -254,7 +261,7 @@ mod tests {
 
         fn step(&mut self) {
             let view = View {
-                measures: &Measures::of(&self.plant, &self.set.options),
+                measures: &Measures::of(&self.plant, &self.set.options, false),
                 set: &self.set,
                 sequence: &self.sequence,
                 regulation: &self.regulation,

@@ -100,9 +100,9 @@ impl Ecu {
         }
     }
 
-    /// How long it has been missed.
-    pub(super) fn silence(&self) -> Duration {
-        self.silence
+    /// Whether it has been silent for so long where it should be heard.
+    pub(super) fn is_missed(&self, patience: Duration) -> bool {
+        !self.silence.is_zero() && self.silence >= patience
     }
 
     /// kWh a litre, of a running engine.
@@ -230,6 +230,6 @@ mod tests {
         assert_eq!(codes(&mut ecu, &plant), [(96, 1), (629, 12)]);
         ecu.cut = true;
         assert_eq!(codes(&mut ecu, &plant), []);
-        assert_eq!(ecu.silence(), Duration::ZERO, "nobody misses it while the engine stands");
+        assert!(!ecu.is_missed(Duration::ZERO), "nobody misses it while the engine stands");
     }
 }

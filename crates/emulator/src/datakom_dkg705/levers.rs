@@ -7,13 +7,21 @@ use crate::plant;
 
 use super::DatakomDkg705;
 
-const OWN: [Lever; 3] = [
+const OWN: [Lever; 4] = [
     Lever::of_words(
         "ecu",
         "J1939 cable",
         &[
             Word::new("connected", "The engine's controller is heard"),
             Word::new("cut", "Nothing comes from the engine's controller"),
+        ],
+    ),
+    Lever::of_words(
+        "genset.wiring",
+        "Wires of the genset's voltages",
+        &[
+            Word::new("normal", "Each phase is where it belongs"),
+            Word::new("swapped", "Two phases have changed places at the unit"),
         ],
     ),
     Lever::of_numbers("service.hours", "Engine hours since the service", &[], (0.0, 5000.0), "h"),
@@ -32,6 +40,7 @@ impl DatakomDkg705 {
     pub(super) fn own_lever(&self, id: &str) -> Option<Position> {
         match id {
             "ecu" => Some(Position::Word(if self.ecu.cut { "cut" } else { "connected" })),
+            "genset.wiring" => Some(Position::Word(if self.genset_swapped { "swapped" } else { "normal" })),
             "service.hours" => Some(number(self.plant.engine.hours - self.service.hours)),
             "service.days" => Some(number(self.days() - self.service.days)),
             _ => None,
@@ -42,6 +51,7 @@ impl DatakomDkg705 {
     pub(super) fn pull_own(&mut self, id: &str, to: Position) {
         match (id, to) {
             ("ecu", Position::Word(word)) => self.ecu.cut = word == "cut",
+            ("genset.wiring", Position::Word(word)) => self.genset_swapped = word == "swapped",
             ("service.hours", Position::Number(hours)) => {
                 self.service.hours = self.plant.engine.hours - hours;
             }

@@ -34,7 +34,8 @@ pub(super) struct Measures {
 }
 
 impl Measures {
-    pub(super) fn of(plant: &Plant, options: &Options) -> Self {
+    /// `swapped` are two wires of the genset's voltages.
+    pub(super) fn of(plant: &Plant, options: &Options, swapped: bool) -> Self {
         let [battery, external] = &plant.batteries;
         let readings = plant.readings();
         let mains_transformers = if options.mains_transformers { options.transformers } else { 0.0 };
@@ -45,7 +46,7 @@ impl Measures {
         };
         Self {
             mains: transformed(&plant.mains, mains_transformers),
-            genset: transformed(&plant.genset, options.transformers),
+            genset: Feed { phase_order_wrong: swapped, ..transformed(&plant.genset, options.transformers) },
             speed: speed.unwrap_or(0.0),
             oil_pressure: readings.oil_pressure.unwrap_or(OPEN_OIL_PRESSURE),
             coolant: readings.coolant.unwrap_or(OPEN_COOLANT),

@@ -79,6 +79,8 @@ pub(crate) struct DatakomDkg705 {
     block_heater: bool,
     fuel_pump: bool,
     sheds_load: bool,
+    /// The site's lever: two wires of the genset's voltages have changed places.
+    genset_swapped: bool,
     partner_silent: Duration,
     service: Service,
     story: bool,
@@ -142,7 +144,7 @@ impl DatakomDkg705 {
         }
         let (set, clock) = (Parameters::of(settings), Clock::at(DateTime::FIRST));
         Self {
-            measures: Measures::of(&plant, &set.options),
+            measures: Measures::of(&plant, &set.options, false),
             set,
             mains: Mains::GOOD,
             sequence: Sequence::new(),
@@ -159,6 +161,7 @@ impl DatakomDkg705 {
             block_heater: false,
             fuel_pump: false,
             sheds_load: false,
+            genset_swapped: false,
             partner_silent: Duration::ZERO,
             service: Service {
                 hours: plant.engine.hours - random.between(20.0, 110.0),
@@ -232,6 +235,7 @@ impl DatakomDkg705 {
             genset_unloaded: measures.genset.total_active() < NEXT_TO_NOTHING,
             // Power that flows back is no sign that the load has moved.
             mains_unloaded: measures.mains.total_active().abs() < NEXT_TO_NOTHING,
+            jolting: plant.is_jolting(),
         }
     }
 
@@ -252,7 +256,6 @@ impl DatakomDkg705 {
         Contacts {
             emergency_stop: self.plant.emergency_stop,
             charger_failed: self.plant.lever("charger") == Some(Position::Word("failed")),
-            mains_order_wrong: mains::is_order_wrong(&self.plant.mains),
             mains_contactor: self.plant.mains_breaker.closed,
             service_due: is_due(hours, service.hours) || is_due(days, service.days),
             partner_missing: self.partner_silent >= PARTNER_SILENCE,
@@ -365,7 +368,7 @@ impl Panel for DatakomDkg705 {
         self.tell();
         // The plant first: the status then tells of contactors that have moved, in the same image.
         self.plant.step(dt.as_secs_f64(), &self.controls);
-        self.measures = Measures::of(&self.plant, &self.set.options);
+        self.measures = Measures::of(&self.plant, &self.set.options, self.genset_swapped);
         self.judge_mains(dt);
         self.judge_load(dt);
         self.exercise(dt);
@@ -384,6 +387,7 @@ impl Panel for DatakomDkg705 {
         self.controls = Controls {
             block_heater: self.block_heater,
             fuel_pump: self.fuel_pump,
+            load_shedding: self.sheds_load,
             ..self.sequence.controls(demand, sensed, &self.set)
         };
         self.clock.step(dt);
@@ -417,7 +421,7 @@ impl Panel for DatakomDkg705 {
 
     fn configure(&mut self, settings: &Settings) {
         self.set = Parameters::of(settings);
-        self.measures = Measures::of(&self.plant, &self.set.options);
+        self.measures = Measures::of(&self.plant, &self.set.options, self.genset_swapped);
     }
 
     fn levers(&self) -> &'static [Lever] {

@@ -109,6 +109,8 @@ pub(super) struct Start {
     pub(super) crank: Duration,
     pub(super) wait_between_starts: Duration,
     pub(super) idle: Duration,
+    /// From idle speed to the first look at what an engine at speed has.
+    pub(super) holdoff: Duration,
     pub(super) heating: Duration,
     /// degC that coolant and oil must have, where they count.
     pub(super) warm: f64,
@@ -348,6 +350,7 @@ impl Reader<'_> {
             crank: self.seconds("crank_timer"),
             wait_between_starts: self.seconds("wait_between_starts_timer"),
             idle: self.seconds("idle_timer"),
+            holdoff: self.seconds("holdoff_time"),
             heating: self.seconds("engine_heating_timer"),
             warm: self.number("engine_heating_temperature"),
             // The manual: with bit 1 it is the oil, whatever bit 0 says.

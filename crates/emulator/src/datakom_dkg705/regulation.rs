@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use crate::plant::{HERTZ_PER_RPM, Plant, RATED_KVAR, RATED_KW, RATED_RPM, RATED_VOLTAGE};
 
+use super::mains::is_order_wrong;
 use super::measures::Measures;
 use super::operation::Operation;
 use super::parameters::{Control, Parameters, Transfer};
@@ -72,11 +73,11 @@ impl Regulation {
 
     /// Whether an output has been at its end for too long.
     pub(super) fn governor_failed(&self, set: &Parameters) -> bool {
-        self.governor.at_end >= set.timers.control_fail
+        self.governor.is_stuck(set.timers.control_fail)
     }
 
     pub(super) fn exciter_failed(&self, set: &Parameters) -> bool {
-        self.exciter.at_end >= set.timers.control_fail
+        self.exciter.is_stuck(set.timers.control_fail)
     }
 
     /// Whether genset and mains have agreed for long enough.
@@ -105,7 +106,7 @@ impl Regulation {
         }
         plant.engine.governor.trim = (2.0 * self.governor.value - 1.0) * GOV_SPAN;
         plant.excitation.trim = (2.0 * self.exciter.value - 1.0) * AVR_SPAN;
-        self.agreed = if agree(plant, set) { self.agreed + dt } else { Duration::ZERO };
+        self.agreed = if agree(plant, measures, set) { self.agreed + dt } else { Duration::ZERO };
     }
 
     /// rpm and V by which the set points miss the share of the load that the genset is to carry.
@@ -121,7 +122,8 @@ impl Regulation {
         let reactive = mains.total_reactive() + genset.total_reactive();
         let target = match (task.operation, task.mains_keep) {
             (Operation::GensetContactorSynch | Operation::SoftToMains, _) => 0.0,
-            (_, Some(kept)) => (active - kept).max(0.0),
+            // No more than the genset has.
+            (_, Some(kept)) => (active - kept).clamp(0.0, RATED_KW),
             _ => active,
         };
         let step = transfer.ramp * dt.as_secs_f64();
@@ -148,6 +150,10 @@ impl Output {
         let at_end = self.value <= 0.0 || self.value >= 1.0;
         self.at_end = if at_end { self.at_end + dt } else { Duration::ZERO };
     }
+
+    fn is_stuck(&self, patience: Duration) -> bool {
+        !self.at_end.is_zero() && self.at_end >= patience
+    }
 }
 
 /// rpm and V by which a genset beside the mains misses its nominal values, or the mains that it is to meet.
@@ -163,10 +169,11 @@ fn missing_alone(operation: Operation, plant: &Plant) -> (f64, f64) {
 }
 
 /// Whether a contactor may close between the two.
-fn agree(plant: &Plant, set: &Parameters) -> bool {
+fn agree(plant: &Plant, measures: &Measures, set: &Parameters) -> bool {
     let (transfer, stands) = (&set.transfer, plant.synchronism());
+    let orders = [&measures.mains, &measures.genset].map(is_order_wrong);
     stands.live
-        && (stands.same_order || set.mains.any_order)
+        && (orders == [false, false] || set.mains.any_order)
         && stands.angle.abs() < transfer.angle
         && stands.slip.abs() < transfer.slip
         && stands.voltage.abs() < transfer.volts

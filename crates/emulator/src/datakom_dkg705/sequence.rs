@@ -49,6 +49,8 @@ pub(super) struct Sensed {
     /// Next to nothing flows through the contactor.
     pub(super) genset_unloaded: bool,
     pub(super) mains_unloaded: bool,
+    /// The two have been joined out of step, and pull at each other.
+    pub(super) jolting: bool,
 }
 
 /// What went wrong on the way; each stays until it is taken back.
@@ -58,6 +60,8 @@ pub(super) struct Failures {
     pub(super) to_stop: bool,
     /// Until the two have come into step after all.
     pub(super) to_synchronize: bool,
+    /// A contactor of ours has joined the two out of step; until a key is pressed.
+    pub(super) out_of_step: bool,
     /// The mains failed while both contactors were closed; until they are trusted again.
     pub(super) mains_in_parallel: bool,
 }
@@ -75,8 +79,12 @@ pub(super) struct Sequence {
     attempts_left: u8,
     /// From the first crank on until the engine is to stop.
     fuel: bool,
+    /// Left until the protections of an engine that has just started are live.
+    holdoff: Duration,
     /// The load has moved over: the contactor that it left opens.
     released: bool,
+    /// The mains contactor has not closed onto good mains when it was last told to.
+    refused: bool,
     pub(super) failures: Failures,
 }
 
@@ -89,7 +97,9 @@ impl Sequence {
             length: Duration::ZERO,
             attempts_left: 0,
             fuel: false,
+            holdoff: Duration::ZERO,
             released: false,
+            refused: false,
             failures: Failures::default(),
         }
     }
@@ -104,6 +114,13 @@ impl Sequence {
     #[cfg(test)]
     pub(super) fn with(self, attempts_left: u8, timer: Duration, released: bool) -> Self {
         Self { attempts_left, timer, released, ..self }
+    }
+
+    /// One that has been joined out of step, or whose mains contactor has refused.
+    #[cfg(test)]
+    pub(super) fn troubled(mut self, out_of_step: bool, refused: bool) -> Self {
+        (self.failures.out_of_step, self.refused) = (out_of_step, refused);
+        self
     }
 
     pub(super) fn operation(&self) -> Operation {
@@ -125,12 +142,11 @@ impl Sequence {
         self.operation == Cranking
     }
 
-    /// Whether the engine has been brought to speed: it can take the load, and its protections are live.
+    /// Whether the engine has had its time to come to speed: it is regulated, and its protections are live.
     pub(super) fn is_up_to_speed(&self) -> bool {
         match self.operation {
             WaitBeforeCrank | Cranking => false,
-            Heating => self.timer.is_zero(),
-            _ => self.fuel,
+            _ => self.fuel && self.holdoff.is_zero(),
         }
     }
 
@@ -157,12 +173,19 @@ impl Sequence {
     pub(super) fn acknowledge(&mut self) {
         self.failures =
             Failures { mains_in_parallel: self.failures.mains_in_parallel, ..Failures::default() };
+        self.refused = false;
     }
 
     pub(super) fn step(&mut self, dt: Duration, demand: Demand, sensed: Sensed, set: &Parameters) {
         self.elapsed += dt;
         self.timer = self.timer.saturating_sub(dt);
+        self.holdoff = self.holdoff.saturating_sub(dt);
         self.failures.mains_in_parallel &= !sensed.mains_trusted;
+        // Elsewhere it is the grid that has come back onto what the genset feeds.
+        self.failures.out_of_step |= sensed.jolting && self.operation.is_synchronizing();
+        self.failures.to_synchronize |= sensed.jolting;
+        self.refused |= self.operation == MainsContactor && self.is_overdue(set) && !sensed.genset_contactor;
+        self.refused &= sensed.mains_healthy && !sensed.mains_contactor;
         self.released |= match self.operation {
             SoftToGenset => sensed.mains_unloaded && demand.load && !demand.parallel,
             SoftToMains => sensed.genset_unloaded,
@@ -200,7 +223,7 @@ impl Sequence {
         let genset = match self.operation {
             GensetContactor => elapsed && !sensed.mains_contactor && sensed.genset_healthy,
             GensetContactorSynch => sensed.in_step || sensed.genset_contactor,
-            LoadOnGenset => demand.load || returns_without_break(sensed, set),
+            LoadOnGenset => demand.load || self.returns_without_break(sensed, set),
             SoftToMains => !self.released,
             SoftToGenset | SynchronizeToMains | MainsContactorSynch => true,
             _ => false,
@@ -212,7 +235,7 @@ impl Sequence {
             MainsContactor => sensed.mains_healthy && elapsed && !sensed.genset_contactor,
             MainsContactorSynch => sensed.mains_healthy && (sensed.in_step || sensed.mains_contactor),
             SoftToGenset => kept && !self.released,
-            OffLoad => kept && !takes_load_with_a_break(demand, sensed, set),
+            OffLoad => kept && !self.takes_load_with_a_break(demand, sensed, set),
             _ => kept,
         };
         Controls {
@@ -233,7 +256,8 @@ impl Sequence {
             AtRest => mains_back(sensed),
             WaitBeforeFuel if !demand.engine => Some(mains_back(sensed).unwrap_or(AtRest)),
             WaitBeforeFuel => after(WaitBeforeCrank),
-            Cranking if sensed.running => Some(Heating),
+            // Some fire with the last turn of the starter.
+            WaitBeforeCrank | Cranking if sensed.running => Some(Heating),
             WaitBeforeCrank | Cranking if !demand.engine => Some(Stopping),
             WaitBeforeCrank => after(Cranking),
             Cranking if self.attempts_left > 0 => after(WaitBeforeCrank),
@@ -241,12 +265,12 @@ impl Sequence {
             Heating if !demand.engine => Some(Cooldown),
             // Who is to take the load goes on heating until its voltage is there.
             Heating if !sensed.warm || demand.load && !sensed.genset_healthy => None,
-            Heating => after(take_load(demand, sensed, set).unwrap_or(OffLoad)),
+            Heating => after(self.take_load(demand, sensed, set).unwrap_or(OffLoad)),
             OffLoad if !demand.engine => Some(Cooldown),
-            OffLoad if demand.load => take_load(demand, sensed, set),
-            OffLoad => mains_back(sensed),
-            Cooldown if demand.engine => Some(take_load(demand, sensed, set).unwrap_or(OffLoad)),
-            Cooldown => mains_back(sensed).or(after(Stopping)),
+            OffLoad if demand.load => self.take_load(demand, sensed, set),
+            OffLoad => mains_back(sensed).filter(|_| !self.refused),
+            Cooldown if demand.engine => Some(self.take_load(demand, sensed, set).unwrap_or(OffLoad)),
+            Cooldown => mains_back(sensed).filter(|_| !self.refused).or(after(Stopping)),
             Stopping => (elapsed && !sensed.turning).then_some(AtRest),
             SynchronizeToGenset | GensetContactorSynch | SoftToGenset | GensetContactor => {
                 self.next_to_genset(demand, sensed, set)
@@ -265,6 +289,10 @@ impl Sequence {
             SynchronizeToGenset if sensed.in_step => Some(GensetContactorSynch),
             // Mains that only want help keep the load; elsewhere it moves with a break.
             SynchronizeToGenset => elapsed.then_some(if demand.parallel { OffLoad } else { GensetContactor }),
+            // Not again before somebody has looked: the load moves with a break, or stays.
+            GensetContactorSynch if self.failures.out_of_step => {
+                Some(if demand.load && !demand.parallel { GensetContactor } else { unloaded(demand) })
+            }
             GensetContactorSynch if !sensed.mains_healthy => {
                 Some(if sensed.genset_contactor { LoadOnGenset } else { GensetContactor })
             }
@@ -278,7 +306,7 @@ impl Sequence {
             SoftToGenset if !sensed.mains_contactor || !sensed.mains_healthy => Some(LoadOnGenset),
             SoftToGenset if !sensed.genset_contactor => Some(unloaded(demand)),
             SoftToGenset => (!demand.load && !self.released).then_some(SoftToMains),
-            GensetContactor if sensed.genset_contactor => Some(LoadOnGenset),
+            GensetContactor if sensed.genset_contactor && !sensed.mains_contactor => Some(LoadOnGenset),
             GensetContactor if !demand.load => Some(mains_back(sensed).unwrap_or(unloaded(demand))),
             _ => None,
         }
@@ -290,7 +318,11 @@ impl Sequence {
         match self.operation {
             // Tripped, or opened because the load goes back with a break.
             LoadOnGenset if !sensed.genset_contactor => Some(mains_back(sensed).unwrap_or(unloaded(demand))),
-            LoadOnGenset => (!stays && returns_without_break(sensed, set) && !sensed.mains_contactor)
+            // The genset would go on feeding a dead line.
+            LoadOnGenset if sensed.mains_contactor && !sensed.mains_healthy => {
+                (self.elapsed >= OPENS_WITHIN + set.timers.contactor_wait).then_some(GensetContactor)
+            }
+            LoadOnGenset => (!stays && self.returns_without_break(sensed, set) && !sensed.mains_contactor)
                 .then_some(SynchronizeToMains),
             SynchronizeToMains if !sensed.genset_contactor => Some(MainsContactor),
             SynchronizeToMains if stays || !sensed.mains_healthy => Some(LoadOnGenset),
@@ -298,6 +330,7 @@ impl Sequence {
             SynchronizeToMains => {
                 elapsed.then_some(if demand.parallel { LoadOnGenset } else { MainsContactor })
             }
+            MainsContactorSynch if self.failures.out_of_step => Some(unloaded(demand)),
             MainsContactorSynch | SoftToMains if !sensed.mains_healthy => Some(LoadOnGenset),
             MainsContactorSynch if !sensed.mains_contactor => {
                 self.is_overdue(set).then_some(SynchronizeToMains)
@@ -313,9 +346,35 @@ impl Sequence {
             MainsContactor if sensed.mains_contactor || !sensed.mains_healthy => {
                 Some(if self.fuel { unloaded(demand) } else { AtRest })
             }
+            MainsContactor if self.refused && self.fuel => Some(unloaded(demand)),
+            MainsContactor if self.refused => demand.engine.then_some(AtRest),
             MainsContactor => (self.fuel && demand.load).then_some(OffLoad),
             _ => None,
         }
+    }
+
+    /// How the running genset takes the load that it is to have.
+    fn take_load(&self, demand: Demand, sensed: Sensed, set: &Parameters) -> Option<Operation> {
+        match (demand.load && sensed.genset_healthy, sensed.mains_contactor) {
+            (false, _) => None,
+            (true, false) => Some(GensetContactor),
+            (true, true) if !sensed.mains_healthy => Some(GensetContactor),
+            (true, true) if self.moves_without_break(set) => Some(SynchronizeToGenset),
+            // The mains contactor opens first, but not for who only wants help.
+            (true, true) => None,
+        }
+    }
+
+    fn takes_load_with_a_break(&self, demand: Demand, sensed: Sensed, set: &Parameters) -> bool {
+        demand.load && !demand.parallel && sensed.genset_healthy && !self.moves_without_break(set)
+    }
+
+    fn returns_without_break(&self, sensed: Sensed, set: &Parameters) -> bool {
+        self.moves_without_break(set) && sensed.mains_healthy
+    }
+
+    fn moves_without_break(&self, set: &Parameters) -> bool {
+        set.transfer.no_break && !self.failures.out_of_step
     }
 
     /// The contactor that was to move has had its timer, and the time that it may take.
@@ -329,6 +388,8 @@ impl Sequence {
             WaitBeforeFuel => self.attempts_left = set.start.attempts,
             WaitBeforeCrank => self.fuel = true,
             Cranking => self.attempts_left = self.attempts_left.saturating_sub(1),
+            MainsContactor => self.refused = false,
+            Heating => self.holdoff = set.start.idle + set.start.holdoff,
             AtRest | Stopping => self.fuel = false,
             _ => {}
         }
@@ -355,26 +416,8 @@ impl Sequence {
 
 /// The fuel solenoid opens this much before the starter turns.
 const FUEL_FIRST: Duration = Duration::from_secs(1);
-
-/// How the running genset takes the load that it is to have.
-fn take_load(demand: Demand, sensed: Sensed, set: &Parameters) -> Option<Operation> {
-    match (demand.load && sensed.genset_healthy, sensed.mains_contactor) {
-        (false, _) => None,
-        (true, false) => Some(GensetContactor),
-        (true, true) if !sensed.mains_healthy => Some(GensetContactor),
-        (true, true) if set.transfer.no_break => Some(SynchronizeToGenset),
-        // The mains contactor opens first.
-        (true, true) => None,
-    }
-}
-
-fn takes_load_with_a_break(demand: Demand, sensed: Sensed, set: &Parameters) -> bool {
-    demand.load && sensed.genset_healthy && !set.transfer.no_break
-}
-
-fn returns_without_break(sensed: Sensed, set: &Parameters) -> bool {
-    set.transfer.no_break && sensed.mains_healthy
-}
+/// What a contactor takes to open.
+const OPENS_WITHIN: Duration = Duration::from_millis(500);
 
 /// Good mains that are not connected take the load after their timer.
 fn mains_back(sensed: Sensed) -> Option<Operation> {
@@ -387,184 +430,4 @@ fn unloaded(demand: Demand) -> Operation {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::parameters::{site, site_with};
-    use super::*;
-
-    const TENTH: Duration = Duration::from_millis(100);
-    const GOOD: Sensed = Sensed {
-        running: true,
-        turning: true,
-        warm: true,
-        genset_healthy: true,
-        mains_healthy: true,
-        mains_trusted: true,
-        genset_contactor: false,
-        mains_contactor: true,
-        in_step: true,
-        genset_unloaded: false,
-        mains_unloaded: false,
-    };
-
-    /// A plant whose contactors follow at once, and whose power moves over at once.
-    struct Bench {
-        set: Parameters,
-        sequence: Sequence,
-        sensed: Sensed,
-        codes: Vec<u16>,
-    }
-
-    impl Bench {
-        fn new(set: Parameters) -> Self {
-            Self { set, sequence: Sequence::new(), sensed: GOOD, codes: vec![0] }
-        }
-
-        fn pass(&mut self, demand: Demand, seconds: u32) {
-            for _ in 0..10 * seconds {
-                self.sensed.turning = self.sequence.fuel;
-                self.sensed.running = self.sequence.fuel;
-                (self.sensed.genset_unloaded, self.sensed.mains_unloaded) = (true, true);
-                self.sequence.step(TENTH, demand, self.sensed, &self.set);
-                let controls = self.sequence.controls(demand, self.sensed, &self.set);
-                (self.sensed.genset_contactor, self.sensed.mains_contactor) =
-                    (controls.genset_breaker, controls.mains_breaker);
-                self.codes.push(self.sequence.operation().code());
-                self.codes.dedup();
-            }
-        }
-    }
-
-    fn walk(set: Parameters, demands: &[(Demand, bool)]) -> Vec<u16> {
-        let mut bench = Bench::new(set);
-        for &(demand, mains_healthy) in demands {
-            bench.sensed.mains_healthy = mains_healthy;
-            bench.pass(demand, 60);
-        }
-        assert_eq!(bench.sequence.failures, Failures::default());
-        bench.codes
-    }
-
-    #[test]
-    fn a_mains_failure_goes_out_with_a_break_and_home_without_one() {
-        let codes = walk(site(), &[(Demand::ON_LOAD, false), (Demand::REST, true)]);
-        assert_eq!(codes, [0, 1, 2, 3, 4, 7, 8, 9, 10, 14, 12, 13, 0]);
-    }
-
-    #[test]
-    fn a_load_test_interrupts_nothing() {
-        let codes = walk(site(), &[(Demand::ON_LOAD, true), (Demand::REST, true)]);
-        assert_eq!(codes, [0, 1, 2, 3, 4, 5, 6, 15, 8, 9, 10, 14, 12, 13, 0]);
-    }
-
-    #[test]
-    fn without_soft_transfer_the_contactors_overlap_and_without_no_break_they_do_not() {
-        let demands = [(Demand::ON_LOAD, true), (Demand::REST, true)];
-        let hard = site_with(&[("soft_transfer", "0")]);
-        assert_eq!(walk(hard, &demands), [0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 12, 13, 0]);
-        let broken = site_with(&[("no_break_transfer", "0")]);
-        // Code 0 while the mains contactor opens: it still carries the load.
-        assert_eq!(walk(broken, &demands), [0, 1, 2, 3, 4, 0, 7, 8, 11, 12, 13, 0]);
-    }
-
-    #[test]
-    fn a_test_runs_beside_the_load_under_code_0() {
-        let codes = walk(site(), &[(Demand::OFF_LOAD, true), (Demand::REST, true)]);
-        assert_eq!(codes, [0, 1, 2, 3, 4, 0, 12, 13, 0]);
-    }
-
-    #[test]
-    fn beside_the_mains_the_power_goes_on_moving_until_it_is_no_longer_wanted() {
-        let codes = walk(site(), &[(Demand::PARALLEL, true), (Demand::REST, true)]);
-        assert_eq!(codes, [0, 1, 2, 3, 4, 5, 6, 15, 14, 12, 13, 0]);
-    }
-
-    #[test]
-    fn out_of_step_the_load_moves_with_a_break_when_the_time_is_over() {
-        let mut bench = Bench::new(site());
-        bench.sensed.in_step = false;
-        bench.pass(Demand::ON_LOAD, 60);
-        assert!(bench.sequence.failures.to_synchronize);
-        bench.pass(Demand::REST, 120);
-        assert_eq!(bench.codes, [0, 1, 2, 3, 4, 5, 7, 8, 9, 11, 12, 13, 0]);
-        bench.sequence.acknowledge();
-        assert!(!bench.sequence.failures.to_synchronize);
-    }
-
-    #[test]
-    fn a_contactor_that_does_not_close_in_step_is_tried_again() {
-        let (demand, set) = (Demand::ON_LOAD, site());
-        let mut sequence = Sequence::new();
-        sequence.fuel = true;
-        sequence.enter(SynchronizeToGenset, &set);
-        let mut codes = Vec::new();
-        for _ in 0..100 {
-            sequence.step(TENTH, demand, GOOD, &set);
-            assert!(sequence.controls(demand, GOOD, &set).mains_breaker, "the mains keep the load");
-            codes.push(sequence.operation().code());
-            codes.dedup();
-        }
-        assert_eq!(codes[..4], [6, 5, 6, 5]);
-        assert!(sequence.failures.to_synchronize);
-    }
-
-    #[test]
-    fn a_short_dip_starts_nothing() {
-        let (mut sequence, set) = (Sequence::new(), site());
-        let dead = Sensed { mains_healthy: false, mains_contactor: false, ..Sensed::default() };
-        sequence.step(TENTH, Demand::ON_LOAD, dead, &set);
-        assert_eq!(sequence.operation(), WaitBeforeFuel);
-        assert!(!sequence.is_committed());
-        sequence.step(TENTH, Demand::REST, Sensed { mains_healthy: true, ..dead }, &set);
-        assert_eq!(sequence.operation(), MainsContactor);
-    }
-
-    #[test]
-    fn all_attempts_then_fail_to_start() {
-        for (attempts, expected) in [
-            ("1", &[1, 2, 3, 13][..]),
-            ("3", &[1, 2, 3, 2, 3, 2, 3, 13]),
-            ("4", &[1, 2, 3, 2, 3, 2, 3, 2, 3, 13]),
-        ] {
-            let (mut sequence, set) = (Sequence::new(), site_with(&[("start_attempts", attempts)]));
-            let mut codes = Vec::new();
-            while !sequence.failures.to_start {
-                assert!(codes.len() < 20, "{codes:?}");
-                sequence.step(TENTH, Demand::OFF_LOAD, Sensed::default(), &set);
-                codes.push(sequence.operation().code());
-                codes.dedup();
-            }
-            assert_eq!(codes, expected);
-            assert!(!sequence.controls(Demand::OFF_LOAD, Sensed::default(), &set).fuel);
-        }
-    }
-
-    #[test]
-    fn an_engine_that_turns_on_after_the_stop_timer_has_failed_to_stop() {
-        let (mut sequence, set) = (Sequence::new(), site());
-        sequence.enter(Stopping, &set);
-        for _ in 0..set.timers.stop.as_secs() * 10 {
-            assert!(!sequence.failures.to_stop);
-            sequence.step(TENTH, Demand::REST, GOOD, &set);
-        }
-        assert!(sequence.failures.to_stop);
-        assert_eq!(sequence.operation(), Stopping);
-    }
-
-    #[test]
-    fn mains_lost_in_parallel_leave_the_load_to_the_genset() {
-        for operation in [GensetContactorSynch, MainsContactorSynch, SoftToMains, SoftToGenset] {
-            let (mut sequence, set) = (Sequence::new(), site());
-            sequence.fuel = true;
-            sequence.enter(operation, &set);
-            let lost = Sensed { mains_healthy: false, mains_trusted: false, genset_contactor: true, ..GOOD };
-            sequence.step(TENTH, Demand::ON_LOAD, lost, &set);
-            assert_eq!(sequence.operation(), LoadOnGenset, "{operation:?}");
-            assert!(sequence.failures.mains_in_parallel);
-            assert!(!sequence.controls(Demand::ON_LOAD, lost, &set).mains_breaker);
-            sequence.acknowledge();
-            assert!(sequence.failures.mains_in_parallel, "it is still so");
-            sequence.step(TENTH, Demand::ON_LOAD, GOOD, &set);
-            assert!(!sequence.failures.mains_in_parallel);
-        }
-    }
-}
+mod tests;

@@ -15,6 +15,7 @@ const TRANSITIONS: &[(Operation, Operation, &str)] = &[
     (WaitBeforeFuel, MainsContactor, "mains are back"),
     (WaitBeforeFuel, WaitBeforeCrank, "timer over, fuel opens"),
     (WaitBeforeCrank, Cranking, "timer over"),
+    (WaitBeforeCrank, Heating, "engine runs after all"),
     (WaitBeforeCrank, Stopping, "no longer wanted"),
     (Cranking, Heating, "engine runs"),
     (Cranking, WaitBeforeCrank, "timer over, attempts left"),
@@ -40,8 +41,10 @@ const TRANSITIONS: &[(Operation, Operation, &str)] = &[
     (GensetContactorSynch, SynchronizeToGenset, "contactor has not closed"),
     (GensetContactorSynch, SoftToGenset, "closed, soft transfer"),
     (GensetContactorSynch, LoadOnGenset, "closed, hard transfer, or mains fail"),
-    (GensetContactorSynch, GensetContactor, "mains fail before it has closed"),
+    (GensetContactorSynch, GensetContactor, "mains fail before it has closed, or joined out of step"),
     (GensetContactorSynch, SoftToMains, "closed, load no longer wanted"),
+    (GensetContactorSynch, OffLoad, "joined out of step, load no longer wanted or peak lopping"),
+    (GensetContactorSynch, Cooldown, "joined out of step, no longer wanted"),
     (SoftToGenset, LoadOnGenset, "mains unloaded and opened, or mains fail"),
     (SoftToGenset, SoftToMains, "load no longer wanted"),
     (SoftToGenset, OffLoad, "genset contactor has fallen"),
@@ -52,6 +55,7 @@ const TRANSITIONS: &[(Operation, Operation, &str)] = &[
     (GensetContactor, Cooldown, "no longer wanted"),
     (LoadOnGenset, SynchronizeToMains, "mains may take the load without a break"),
     (LoadOnGenset, MainsContactor, "genset contactor open, mains good"),
+    (LoadOnGenset, GensetContactor, "mains fail, and their contactor does not open"),
     (LoadOnGenset, OffLoad, "genset contactor has fallen"),
     (LoadOnGenset, Cooldown, "genset contactor open, no longer wanted"),
     (SynchronizeToMains, MainsContactorSynch, "in step"),
@@ -61,15 +65,15 @@ const TRANSITIONS: &[(Operation, Operation, &str)] = &[
     (MainsContactorSynch, SoftToMains, "closed, soft transfer"),
     (MainsContactorSynch, SoftToGenset, "closed, load wanted again or peak lopping"),
     (MainsContactorSynch, LoadOnGenset, "mains fail, or load wanted again in hard transfer"),
-    (MainsContactorSynch, Cooldown, "closed, hard transfer"),
-    (MainsContactorSynch, OffLoad, "closed, hard transfer, engine still wanted"),
+    (MainsContactorSynch, Cooldown, "closed in hard transfer, or joined out of step"),
+    (MainsContactorSynch, OffLoad, "the same, engine still wanted"),
     (SoftToMains, LoadOnGenset, "mains fail"),
     (SoftToMains, SoftToGenset, "load wanted again"),
     (SoftToMains, Cooldown, "genset unloaded and opened"),
     (SoftToMains, OffLoad, "genset unloaded and opened, engine still wanted"),
-    (MainsContactor, AtRest, "closed or mains fail, engine stands"),
-    (MainsContactor, OffLoad, "closed, mains fail or load wanted, engine wanted"),
-    (MainsContactor, Cooldown, "closed or mains fail, engine no longer wanted"),
+    (MainsContactor, AtRest, "closed or mains fail, or contactor refuses and engine wanted, engine stands"),
+    (MainsContactor, OffLoad, "closed, mains fail, contactor refuses or load wanted, engine wanted"),
+    (MainsContactor, Cooldown, "closed, mains fail or contactor refuses, engine no longer wanted"),
 ];
 
 const ALL: [Operation; 17] = [
@@ -110,6 +114,7 @@ fn plants() -> impl Iterator<Item = Sensed> {
             in_step: bit(7),
             genset_unloaded: bit(8),
             mains_unloaded: bit(9),
+            jolting: false,
         }
     })
 }
@@ -132,7 +137,11 @@ fn sequences(operation: Operation) -> Vec<Sequence> {
         {
             for attempts_left in [0, 1] {
                 for released in [false, true] {
-                    all.push(Sequence::amid(operation, fuel, elapsed).with(attempts_left, timer, released));
+                    let sequence =
+                        Sequence::amid(operation, fuel, elapsed).with(attempts_left, timer, released);
+                    let (joined_badly, refused) =
+                        (sequence.clone().troubled(true, false), sequence.clone().troubled(false, true));
+                    all.extend([sequence, joined_badly, refused]);
                 }
             }
         }

@@ -12,6 +12,8 @@ pub(super) enum Live {
     Always,
     /// The starter dips the battery.
     NotCranking,
+    /// From the first crank on.
+    Fuelled,
     UpToSpeed,
 }
 
@@ -46,15 +48,19 @@ fn below(value: f64, limit: f64) -> f64 {
     if limit > 0.0 { limit - value } else { f64::NEG_INFINITY }
 }
 
+/// By how much more than its limit a speed must be to count at once, and before the engine is up to it.
+const FAR: f64 = 1.12;
+
+const AT_ONCE: fn(&Timers) -> Duration = |_| Duration::ZERO;
 const USUAL: fn(&Timers) -> Duration = |timers| timers.alarm;
 const FUEL: fn(&Timers) -> Duration = |timers| timers.fuel_alarm;
 const BATTERY: fn(&Timers) -> Duration = |timers| timers.battery_alarm;
 const OVERLOAD: fn(&Timers) -> Duration = |timers| timers.overload;
 const REVERSE: fn(&Timers) -> Duration = |timers| timers.reverse_power;
 
-use Live::{Always, NotCranking, UpToSpeed};
+use Live::{Always, Fuelled, NotCranking, UpToSpeed};
 
-pub(super) const WATCHES: [Watch; 27] = [
+pub(super) const WATCHES: [Watch; 29] = [
     watch((Shutdown1, 0), UpToSpeed, USUAL, 0.0, |m, s| {
         below(m.oil_pressure_at_switch, s.oil_pressure_switch)
     }),
@@ -62,6 +68,9 @@ pub(super) const WATCHES: [Watch; 27] = [
     watch((Shutdown1, 9), UpToSpeed, USUAL, 0.0, |m, s| below(m.genset.frequency, s.low_frequency_shutdown)),
     watch((Shutdown1, 10), UpToSpeed, USUAL, 0.0, |m, s| {
         above(m.genset.frequency, s.high_frequency_shutdown)
+    }),
+    watch((Shutdown1, 10), Fuelled, AT_ONCE, 0.0, |m, s| {
+        above(m.genset.frequency, FAR * s.high_frequency_shutdown)
     }),
     watch((Shutdown1, 11), Always, USUAL, 0.0, |m, s| above(m.battery, s.high_battery_shutdown)),
     watch((Shutdown1, 12), Always, FUEL, 0.0, |m, s| below(m.fuel_level, s.low_fuel_shutdown)),
@@ -78,6 +87,7 @@ pub(super) const WATCHES: [Watch; 27] = [
     }),
     watch((Shutdown2, 6), UpToSpeed, USUAL, 0.0, |m, s| below(m.speed, s.low_rpm_shutdown)),
     watch((Shutdown2, 7), UpToSpeed, USUAL, 0.0, |m, s| above(m.speed, s.high_rpm_shutdown)),
+    watch((Shutdown2, 7), Fuelled, AT_ONCE, 0.0, |m, s| above(m.speed, FAR * s.high_rpm_shutdown)),
     watch((LoadDump, 13), UpToSpeed, REVERSE, 0.0, |m, s| above(-m.genset.total_active(), s.reverse_power)),
     watch((LoadDump, 14), UpToSpeed, OVERLOAD, 0.0, |m, s| above(m.genset.total_active(), s.excess_power)),
     watch((LoadDump, 15), UpToSpeed, OVERLOAD, 0.0, |m, s| above(highest(m.genset.current()), s.overcurrent)),

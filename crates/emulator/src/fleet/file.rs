@@ -9,8 +9,8 @@ use toml::de::DeTable;
 use super::{Fleet, Joint, Member};
 use crate::config::Config;
 use crate::device::Device;
-use crate::notes::text::shown;
 use crate::notes::{self, Entry, Notes, entries};
+use busbar_profile::text::shown;
 
 const FILE: [&str; 5] = ["fleet", "wires", "controllers", "supplies", "bus_bars"];
 const WIRE: [&str; 2] = ["id", "endpoint"];
@@ -22,7 +22,7 @@ const SUPPLY: [&str; 3] = ["from", "section", "to"];
 const MOST: usize = 100;
 
 pub(super) fn fleet(file: &str, text: &str) -> Result<Fleet, Findings> {
-    let fleet = notes::read(file, text, read)?;
+    let fleet = notes::read(file, text, "leave one of them out", read)?;
     // Without a finding there is a fleet.
     Ok(fleet.unwrap_or_else(|| Fleet {
         title: String::new(),
@@ -54,7 +54,7 @@ fn read(root: &DeTable<'_>, notes: &mut Notes<'_>) -> Option<Fleet> {
     // In this order, for each names what those before it are.
     for key in &FILE[1..] {
         let found = all.iter().find(|entry| entry.key == *key);
-        for (table, span) in found.map(|entry| tables(entry, notes)).unwrap_or_default() {
+        for (table, span) in found.map(|entry| notes.tables(entry)).unwrap_or_default() {
             match *key {
                 "wires" => draft.wire(table, span, notes),
                 "controllers" => draft.controller(table, span, notes),
@@ -81,7 +81,7 @@ fn head(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<String> {
         match inner.key.as_str() {
             "title" => {
                 titled = true;
-                title = notes.title(&inner);
+                title = notes.line(&inner, 100);
             }
             _ => notes.unknown_key(&inner, "[fleet]", &["title"]),
         }
@@ -90,24 +90,6 @@ fn head(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<String> {
         notes.missing(entry.span.clone(), "[fleet]", "title", "\"Two gensets\"");
     }
     title
-}
-
-type Table<'t, 'i> = (&'t DeTable<'i>, Range<usize>);
-
-/// The tables of a list of tables.
-fn tables<'t, 'i>(entry: &Entry<'t, 'i>, notes: &mut Notes<'_>) -> Vec<Table<'t, 'i>> {
-    let items = entry.value.get_ref().as_array();
-    let tables: Option<Vec<_>> = items.map(|items| {
-        items.iter().filter_map(|item| Some((item.get_ref().as_table()?, item.span()))).collect()
-    });
-    match tables.filter(|tables| Some(tables.len()) == items.map(|items| items.len())) {
-        Some(tables) => tables,
-        None => {
-            let wanted = format!("a list of tables, each headed [[{}]]", entry.key);
-            notes.wrong_type::<()>(entry, &wanted);
-            Vec::new()
-        }
-    }
 }
 
 impl Draft {
@@ -157,7 +139,7 @@ impl Draft {
             let known = self.members.iter().any(|(member, _)| Some(member.id.as_str()) == text);
             new_id(entry, known, notes)
         });
-        let name = of("name").map(|entry| notes.title(entry));
+        let name = of("name").map(|entry| notes.line(entry, 100));
         let wire = of("wire").and_then(|entry| self.wire_of(entry, notes));
         let (mut config, mut probe) = self.config(&all, notes)?;
         config.pins = settings(of("settings"), &mut probe, notes);

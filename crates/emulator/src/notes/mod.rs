@@ -1,16 +1,17 @@
 //! TOML files of people: typed values with their places, and a finding with a remedy where one is wrong.
 
-pub(crate) mod text;
-
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
+use busbar_profile::text::{duration, in_words, shown};
 use busbar_profile::{Collector, Findings, Profile, builtin, builtins, nearest};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::device::Device;
-use text::{duration, in_words, shown};
+
+/// Who has mended these will be told the others.
+const MOST_FOUND: usize = 100;
 
 /// Where something stands in a file, both from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,13 +20,14 @@ pub(crate) struct Place {
     pub(crate) column: usize,
 }
 
-/// Reads a file whose name only serves the findings. Nothing comes of a text in which anything is wrong.
+/// Reads a file whose name only serves the findings; `twice` is what to do about a key that is there twice. Nothing comes of a text in which anything is wrong.
 ///
 /// # Errors
 /// Everything that is wrong with it.
 pub(crate) fn read<T>(
     file: &str,
     text: &str,
+    twice: &str,
     understand: impl FnOnce(&DeTable<'_>, &mut Notes<'_>) -> Option<T>,
 ) -> Result<Option<T>, Findings> {
     let mut notes = Notes::new(file, text);
@@ -33,7 +35,11 @@ pub(crate) fn read<T>(
     for error in errors {
         let span = error.span().unwrap_or(0..0);
         let message = error.message().replace('\n', ", ");
-        notes.add(span.clone(), format!("this is not TOML: {message}"), syntax_help(text, span.start));
+        let help = match message.starts_with("duplicate key") {
+            true => twice,
+            false => syntax_help(text, span.start),
+        };
+        notes.add(span, format!("this is not TOML: {message}"), help);
     }
     if !notes.is_clean() {
         // After a syntax error the rest of the text means who knows what.
@@ -60,7 +66,7 @@ pub(crate) struct Notes<'a> {
     /// Where its lines begin.
     lines: Vec<usize>,
     findings: Collector<'a>,
-    clean: bool,
+    count: usize,
 }
 
 /// A key with its value.
@@ -74,11 +80,11 @@ pub(crate) struct Entry<'t, 'i> {
 impl<'a> Notes<'a> {
     fn new(file: &'a str, text: &'a str) -> Self {
         let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(newline, _)| newline + 1));
-        Self { text, lines: lines.collect(), findings: Collector::new(file, text), clean: true }
+        Self { text, lines: lines.collect(), findings: Collector::new(file, text), count: 0 }
     }
 
     pub(crate) fn add(&mut self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) {
-        self.clean = false;
+        self.count += 1;
         self.findings.add(span, message, help);
     }
 
@@ -91,7 +97,12 @@ impl<'a> Notes<'a> {
     }
 
     pub(crate) fn is_clean(&self) -> bool {
-        self.clean
+        self.count == 0
+    }
+
+    /// Whether that much was found that nobody reads on, nor looks for more.
+    pub(crate) fn is_full(&self) -> bool {
+        self.count >= MOST_FOUND
     }
 
     fn finish(self) -> Result<(), Findings> {
@@ -126,15 +137,16 @@ impl<'a> Notes<'a> {
         }
     }
 
-    /// What people call something: one line that is not empty.
-    pub(crate) fn title(&mut self, entry: &Entry<'_, '_>) -> Option<String> {
-        let title = self.text(entry)?;
-        let fits = (1..=100).contains(&title.trim().chars().count()) && !title.contains(char::is_control);
+    /// A text on one line, of so many characters at most.
+    pub(crate) fn line(&mut self, entry: &Entry<'_, '_>, most: usize) -> Option<String> {
+        let text = self.text(entry)?;
+        let text = text.trim();
+        let fits = (1..=most).contains(&text.chars().count()) && !text.contains(char::is_control);
         if !fits {
             let message = format!("this is no {}", entry.key);
-            self.add(entry.value.span(), message, "write 1 to 100 characters on one line");
+            self.add(entry.value.span(), message, format!("write 1 to {most} characters on one line"));
         }
-        fits.then(|| title.trim().to_owned())
+        fits.then(|| text.to_owned())
     }
 
     /// The built-in profile of a key.
@@ -192,7 +204,11 @@ impl<'a> Notes<'a> {
             DeValue::String(text) => Some(text.as_ref().to_owned()),
             DeValue::Integer(integer) => match i64::from_str_radix(integer.as_str(), integer.radix()) {
                 Ok(number) => Some(number.to_string()),
-                Err(_) => self.wrong_type(entry, "a smaller number"),
+                Err(_) => {
+                    let message = format!("`{}` is {}", entry.key, shown(integer.as_str()));
+                    self.add(entry.value.span(), message, "write a smaller number");
+                    None
+                }
             },
             DeValue::Float(float) => Some(float.as_str().to_owned()),
             _ => self.wrong_type(entry, "a text in quotes, or a number"),
@@ -201,11 +217,15 @@ impl<'a> Notes<'a> {
 
     /// A whole number that is not negative.
     pub(crate) fn whole(&mut self, entry: &Entry<'_, '_>) -> Option<u64> {
-        let number = entry.value.get_ref().as_integer();
-        match number.and_then(|number| u64::from_str_radix(number.as_str(), number.radix()).ok()) {
-            Some(number) => Some(number),
-            None => self.wrong_type(entry, "a whole number from 0 on, without quotes"),
+        let Some(integer) = entry.value.get_ref().as_integer() else {
+            return self.wrong_type(entry, "a whole number without quotes");
+        };
+        let number = u64::from_str_radix(integer.as_str(), integer.radix()).ok();
+        if number.is_none() {
+            let message = format!("`{}` is {}", entry.key, shown(integer.as_str()));
+            self.add(entry.value.span(), message, format!("write a whole number from 0 to {}", u64::MAX));
         }
+        number
     }
 
     pub(crate) fn duration(
@@ -241,6 +261,18 @@ impl<'a> Notes<'a> {
             Some(table) => Some(entries(table)),
             None => self.wrong_type(entry, "a table, such as { name = 1 }"),
         }
+    }
+
+    /// The tables of a list of tables, each with its place.
+    pub(crate) fn tables<'t, 'i>(&mut self, entry: &Entry<'t, 'i>) -> Vec<(&'t DeTable<'i>, Range<usize>)> {
+        let items = entry.value.get_ref().as_array();
+        let tables: Option<Vec<_>> = items.and_then(|items| {
+            items.iter().map(|item| Some((item.get_ref().as_table()?, item.span()))).collect()
+        });
+        tables.unwrap_or_else(|| {
+            self.wrong_type::<()>(entry, &format!("a list of tables, each headed [[{}]]", entry.key));
+            Vec::new()
+        })
     }
 
     pub(crate) fn wrong_type<T>(&mut self, entry: &Entry<'_, '_>, wanted: &str) -> Option<T> {

@@ -12,6 +12,9 @@ use super::senders::Senders;
 use super::supplies::Service;
 use super::{Battery, Engine, RATED_KW, RATED_RPM, Readings, Tank};
 
+/// degC at which the coolant heater's thermostat opens.
+const HEATED: f64 = 60.0;
+
 /// What a panel can do to the compressor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Orders {
@@ -25,6 +28,8 @@ pub(crate) struct Orders {
     pub(crate) load_valve: bool,
     /// The receiver is vented.
     pub(crate) blow_down: bool,
+    /// Coolant heater on.
+    pub(crate) heater: bool,
 }
 
 /// What the senders behind the screw tell; nothing from a broken one.
@@ -34,6 +39,8 @@ pub(crate) struct Discharge {
     pub(crate) pressure: Option<f64>,
     /// degC.
     pub(crate) temperature: Option<f64>,
+    /// Its wires touch, hence nothing.
+    pub(crate) temperature_shorted: bool,
     /// kPa lost across the oil separator.
     pub(crate) separator_loss: Option<f64>,
 }
@@ -42,8 +49,17 @@ pub(crate) struct Discharge {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct DischargeSenders {
     pub(super) pressure: bool,
-    pub(super) temperature: bool,
+    pub(super) temperature: Wires,
     pub(super) separator: bool,
+}
+
+/// The wires of a sender.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Wires {
+    #[default]
+    Whole,
+    Broken,
+    Shorted,
 }
 
 /// The whole of it; a panel reads the fields and hands back [`Orders`].
@@ -118,7 +134,7 @@ impl Compressor {
             fed: self.tank.feeds(),
             starter: starter.then(|| self.battery.strength()),
             idle: orders.idle,
-            heater: false,
+            heater: orders.heater && self.engine.coolant < HEATED,
             load: self.shaft_power(),
             ambient: self.intake,
         };
@@ -152,7 +168,8 @@ impl Compressor {
         let unless = |broken: bool, value: f64| (!broken).then_some(value);
         Discharge {
             pressure: unless(broken.pressure, air.pressure),
-            temperature: unless(broken.temperature, air.temperature),
+            temperature: unless(broken.temperature != Wires::Whole, air.temperature),
+            temperature_shorted: broken.temperature == Wires::Shorted,
             separator_loss: unless(broken.separator, air.separator_loss),
         }
     }
@@ -204,8 +221,15 @@ mod tests {
     use super::super::COMPRESSOR_LEVERS;
     use super::*;
 
-    const RUNNING: Orders =
-        Orders { fuel: true, starter: false, idle: false, load_valve: false, blow_down: false };
+    const REST: Orders = Orders {
+        fuel: false,
+        starter: false,
+        idle: false,
+        load_valve: false,
+        blow_down: false,
+        heater: false,
+    };
+    const RUNNING: Orders = Orders { fuel: true, ..REST };
     const LOADED: Orders = Orders { load_valve: true, ..RUNNING };
 
     fn run(plant: &mut Compressor, orders: &Orders, seconds: f64) {
@@ -311,6 +335,17 @@ mod tests {
         };
         let (clean, clogged) = (after("clean"), after("clogged"));
         assert!(clogged.0 < 0.9 * clean.0 && clogged.1 < 0.8 * clean.1, "{clean:?} {clogged:?}");
+    }
+
+    #[test]
+    fn the_heater_warms_the_coolant_as_far_as_its_thermostat_lets_it() {
+        let after = |heater, seconds| {
+            let mut plant = Compressor::new(8);
+            run(&mut plant, &Orders { heater, ..REST }, seconds);
+            plant.engine.coolant
+        };
+        assert!((10.0..25.0).contains(&(after(true, 1800.0) - after(false, 1800.0))));
+        assert!((59.0..61.0).contains(&after(true, 7200.0)), "{}", after(true, 7200.0));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use crate::levers::{Lever, Position, Word};
 
 use super::Compressor;
 use super::air::Intake;
+use super::compressor::Wires;
 use super::engine_levers::{
     self as engine, BLOCKS, BREAKS, NORMAL, PRESSES, SENDER, held, held_or, set, shown,
 };
@@ -90,7 +91,15 @@ pub(crate) const COMPRESSOR_LEVERS: &[Lever] = &[
     engine::TEMPERATURE_SENDER,
     engine::FUEL_LEVEL_SENDER,
     Lever::of_words("sender.discharge_pressure", "Discharge pressure sender", &SENDER),
-    Lever::of_words("sender.discharge_temperature", "Discharge temperature sender", &SENDER),
+    Lever::of_words(
+        "sender.discharge_temperature",
+        "Discharge temperature sender",
+        &[
+            NORMAL,
+            SENDER[1],
+            Word::new("shorted", "Its wires touch: nothing that could be a temperature is read"),
+        ],
+    ),
     Lever::of_words("sender.separator", "Separator pressure sender", &SENDER),
     engine::PICKUP,
     Lever::of_words(
@@ -116,6 +125,8 @@ const REGENERATIONS: [(&str, Regeneration); 3] = [
     ("inhibited", Regeneration::Inhibited),
     ("by_hand", Regeneration::ByHand),
 ];
+const WIRES: [(&str, Wires); 3] =
+    [("normal", Wires::Whole), ("broken", Wires::Broken), ("shorted", Wires::Shorted)];
 const SILENT: [(&str, bool); 2] = [("normal", false), ("silent", true)];
 const DOORS: [(&str, bool); 2] = [("shut", false), ("open", true)];
 
@@ -135,17 +146,13 @@ impl Compressor {
             "dpf.soot" => Some(Position::Number(tenth(self.filter.soot))),
             "dpf.regeneration" => shown(&REGENERATIONS, self.filter.regeneration),
             "ambient" => held_or("normal", self.climate.held),
-            "sender.oil_pressure" => shown(&BREAKS, self.senders.oil_pressure),
-            "sender.temperature" => shown(&BREAKS, self.senders.temperature),
-            "sender.fuel_level" => shown(&BREAKS, self.senders.fuel_level),
             "sender.discharge_pressure" => shown(&BREAKS, discharge.pressure),
-            "sender.discharge_temperature" => shown(&BREAKS, discharge.temperature),
+            "sender.discharge_temperature" => shown(&WIRES, discharge.temperature),
             "sender.separator" => shown(&BREAKS, discharge.separator),
-            "pickup" => shown(&BREAKS, self.senders.pickup),
             "ecu" => shown(&SILENT, self.ecu_silent),
             "door" => shown(&DOORS, self.door_open),
             "emergency_stop" => shown(&PRESSES, self.emergency_stop),
-            _ => engine::lever(id, &self.engine, &self.tank, &self.battery),
+            _ => engine::lever(id, &self.engine, &self.tank, &self.battery, self.senders),
         }
     }
 
@@ -164,19 +171,15 @@ impl Compressor {
             "dpf.soot" => self.filter.soot = held(to).unwrap_or(self.filter.soot),
             "dpf.regeneration" => set(&REGENERATIONS, to, |how| self.filter.regeneration = how),
             "ambient" => self.climate.held = held(to),
-            "sender.oil_pressure" => set(&BREAKS, to, |broken| self.senders.oil_pressure = broken),
-            "sender.temperature" => set(&BREAKS, to, |broken| self.senders.temperature = broken),
-            "sender.fuel_level" => set(&BREAKS, to, |broken| self.senders.fuel_level = broken),
             "sender.discharge_pressure" => set(&BREAKS, to, |broken| discharge.pressure = broken),
-            "sender.discharge_temperature" => set(&BREAKS, to, |broken| discharge.temperature = broken),
+            "sender.discharge_temperature" => set(&WIRES, to, |wires| discharge.temperature = wires),
             "sender.separator" => set(&BREAKS, to, |broken| discharge.separator = broken),
-            "pickup" => set(&BREAKS, to, |broken| self.senders.pickup = broken),
             "ecu" => set(&SILENT, to, |silent| self.ecu_silent = silent),
             "door" => set(&DOORS, to, |open| self.door_open = open),
             "emergency_stop" => set(&PRESSES, to, |pressed| self.emergency_stop = pressed),
             _ => {
                 let batteries = std::slice::from_mut(&mut self.battery);
-                engine::pull(id, to, &mut self.engine, &mut self.tank, batteries);
+                engine::pull(id, to, &mut self.engine, &mut self.tank, batteries, &mut self.senders);
             }
         }
     }

@@ -5,6 +5,7 @@ use crate::levers::{Lever, Position, Word};
 use super::engine::Ignition;
 use super::governor::Fault;
 use super::load::tenth;
+use super::senders::Senders;
 use super::supplies::Health;
 use super::{Battery, Engine, Tank};
 
@@ -104,16 +105,22 @@ const GOVERNORS: [(&str, Fault); 4] = [
 ];
 const HEALTHS: [(&str, Health); 3] =
     [("normal", Health::Normal), ("weak", Health::Weak), ("flat", Health::Flat)];
-pub(super) const LEAKS: [(&str, bool); 2] = [("normal", false), ("leaking", true)];
+const LEAKS: [(&str, bool); 2] = [("normal", false), ("leaking", true)];
 pub(super) const FAILS: [(&str, bool); 2] = [("normal", false), ("failed", true)];
 pub(super) const BREAKS: [(&str, bool); 2] = [("normal", false), ("broken", true)];
-pub(super) const STICKS: [(&str, bool); 2] = [("normal", false), ("stuck", true)];
+const STICKS: [(&str, bool); 2] = [("normal", false), ("stuck", true)];
 pub(super) const BLOCKS: [(&str, bool); 2] = [("clear", false), ("blocked", true)];
 pub(super) const PRESSES: [(&str, bool); 2] = [("released", false), ("pressed", true)];
 const SHUTS: [(&str, bool); 2] = [("open", false), ("shut", true)];
 
 /// Where a lever of an engine stands; none where there is no such lever.
-pub(super) fn lever(id: &str, engine: &Engine, tank: &Tank, battery: &Battery) -> Option<Position> {
+pub(super) fn lever(
+    id: &str,
+    engine: &Engine,
+    tank: &Tank,
+    battery: &Battery,
+    senders: Senders,
+) -> Option<Position> {
     match id {
         "ignition" => Some(match engine.ignition() {
             Ignition::Normal => Position::Word("normal"),
@@ -130,12 +137,23 @@ pub(super) fn lever(id: &str, engine: &Engine, tank: &Tank, battery: &Battery) -
         "battery" => shown(&HEALTHS, battery.health()),
         "charger" => shown(&FAILS, battery.charger_failed),
         "charge_alternator" => shown(&FAILS, battery.alternator_failed),
+        "sender.oil_pressure" => shown(&BREAKS, senders.oil_pressure),
+        "sender.temperature" => shown(&BREAKS, senders.temperature),
+        "sender.fuel_level" => shown(&BREAKS, senders.fuel_level),
+        "pickup" => shown(&BREAKS, senders.pickup),
         _ => None,
     }
 }
 
 /// Pulls a lever of an engine. The first of the batteries turns its starter.
-pub(super) fn pull(id: &str, to: Position, engine: &mut Engine, tank: &mut Tank, batteries: &mut [Battery]) {
+pub(super) fn pull(
+    id: &str,
+    to: Position,
+    engine: &mut Engine,
+    tank: &mut Tank,
+    batteries: &mut [Battery],
+    senders: &mut Senders,
+) {
     match id {
         "ignition" => engine.set_ignition(match to {
             Position::Word("never") => Ignition::Never,
@@ -158,6 +176,10 @@ pub(super) fn pull(id: &str, to: Position, engine: &mut Engine, tank: &mut Tank,
         "charge_alternator" => set(&FAILS, to, |failed| {
             batteries.iter_mut().for_each(|battery| battery.alternator_failed = failed);
         }),
+        "sender.oil_pressure" => set(&BREAKS, to, |broken| senders.oil_pressure = broken),
+        "sender.temperature" => set(&BREAKS, to, |broken| senders.temperature = broken),
+        "sender.fuel_level" => set(&BREAKS, to, |broken| senders.fuel_level = broken),
+        "pickup" => set(&BREAKS, to, |broken| senders.pickup = broken),
         _ => {}
     }
 }

@@ -7,11 +7,15 @@ const BURNS_ABOVE: f64 = 280.0;
 /// Percent of soot at which the filter cleans itself, and at which it has done so.
 const REGENERATE_AT: f64 = 80.0;
 const CLEAN_AT: f64 = 15.0;
-/// Percent of soot at which nothing goes through any more.
-const PLUGGED: f64 = 150.0;
-/// degC that a burner adds: while driving, and while a person sees to it with the engine unloaded.
+/// Percent at which it wants a person, is too full to be burned clean, lets hardly anything through, and holds no more.
+const WANTS_A_PERSON: f64 = 95.0;
+const FAILED: f64 = 120.0;
+const PLUGGED: f64 = 140.0;
+const FULL: f64 = 150.0;
+/// degC that a burner adds: while working, and while a person sees to it with the engine unloaded; and up to which.
 const BURNER: f64 = 130.0;
 const BURNER_BY_HAND: f64 = 320.0;
+const BURNER_UP_TO: f64 = 580.0;
 /// degC that too little air adds at full pull, and part of the boost that is left.
 const STARVED: f64 = 110.0;
 const STARVED_BOOST: f64 = 0.6;
@@ -52,7 +56,8 @@ impl Exhaust {
             ),
             false => (gas.around, 400.0, 0.0),
         };
-        approach(&mut self.temperature, temperature + filter.burner(), memory, dt);
+        let burned = (temperature + filter.burner()).min(BURNER_UP_TO);
+        approach(&mut self.temperature, burned.max(temperature), memory, dt);
         approach(&mut self.boost, boost, 1.5, dt);
     }
 }
@@ -64,7 +69,7 @@ pub(super) enum Regeneration {
     Automatic,
     /// Not at all: somebody has forbidden it.
     Inhibited,
-    /// A person has asked for it beside the running engine; until it is done.
+    /// A person has asked for it beside the running engine: until it is done, or the engine stops under it.
     ByHand,
 }
 
@@ -89,8 +94,11 @@ impl ParticleFilter {
             Regeneration::Inhibited => false,
             Regeneration::ByHand => true,
         };
-        self.regenerating = running && wanted && self.soot > CLEAN_AT;
-        if self.regeneration == Regeneration::ByHand && self.soot <= CLEAN_AT {
+        let interrupted = self.regenerating && !running;
+        // So much soot would melt it.
+        let burns = self.soot > CLEAN_AT && !self.has_failed();
+        self.regenerating = running && wanted && burns;
+        if self.regeneration == Regeneration::ByHand && (interrupted || !burns) {
             self.regeneration = Regeneration::Automatic;
         }
         let per_hour = match (running, self.regenerating && hot, hot) {
@@ -100,7 +108,7 @@ impl ParticleFilter {
             (.., true) => 7.0,
             _ => 25.0,
         };
-        self.soot = (self.soot + per_hour * dt / 3600.0).clamp(0.0, PLUGGED);
+        self.soot = (self.soot + per_hour * dt / 3600.0).clamp(0.0, FULL);
     }
 
     /// degC that the burner adds to the exhaust.
@@ -128,12 +136,17 @@ impl ParticleFilter {
 
     /// It filled up without ever getting hot: somebody has to see to it.
     pub(crate) fn needs_a_person(&self) -> bool {
-        self.soot >= 95.0 && !self.regenerating
+        self.soot >= WANTS_A_PERSON && !self.regenerating
     }
 
-    /// It is clogged.
+    /// It is too full to be burned clean: another has to be put in.
     pub(crate) fn has_failed(&self) -> bool {
-        self.soot >= 120.0
+        self.soot >= FAILED
+    }
+
+    /// Hardly anything goes through it.
+    pub(crate) fn is_plugged(&self) -> bool {
+        self.soot >= PLUGGED
     }
 }
 
@@ -190,6 +203,34 @@ mod tests {
         }
         assert!(!filter.is_regenerating() && filter.soot < 20.0, "{}", filter.soot);
         assert_eq!(filter.regeneration, Regeneration::Automatic);
+    }
+
+    #[test]
+    fn what_a_person_asked_for_ends_with_the_engine_and_is_refused_by_a_filter_that_failed() {
+        let asked = |soot| ParticleFilter { regeneration: Regeneration::ByHand, ..ParticleFilter::new(soot) };
+        let mut filter = asked(90.0);
+        filter.step(1.0, false, &Exhaust::new(20.0));
+        assert_eq!(filter.regeneration, Regeneration::ByHand, "it waits for the start");
+        filter.step(1.0, true, &Exhaust::new(150.0));
+        assert!(filter.is_regenerating());
+        filter.step(1.0, false, &Exhaust::new(150.0));
+        assert_eq!(filter.regeneration, Regeneration::Automatic);
+        let mut filter = asked(121.0);
+        filter.step(1.0, true, &Exhaust::new(450.0));
+        assert!(!filter.is_regenerating() && filter.has_failed() && !filter.is_plugged());
+        assert_eq!(filter.regeneration, Regeneration::Automatic);
+    }
+
+    #[test]
+    fn the_burner_heats_an_exhaust_that_is_hot_already_no_further_than_it_has_to() {
+        let mut filter = ParticleFilter { regeneration: Regeneration::ByHand, ..ParticleFilter::new(100.0) };
+        let mut exhaust = Exhaust::new(400.0);
+        let gas = Gas { running: true, pull: 1.0, speed: 1.0, starved: false, around: 20.0 };
+        for _ in 0..300 {
+            exhaust.step(1.0, gas, &filter);
+            filter.step(1.0, true, &exhaust);
+        }
+        assert!(filter.is_regenerating() && (500.0..590.0).contains(&exhaust.temperature));
     }
 
     #[test]

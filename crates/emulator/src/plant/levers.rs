@@ -4,9 +4,7 @@ use crate::levers::{Lever, Position, Word};
 
 use super::alternator::Avr;
 use super::breaker::Stuck;
-use super::engine_levers::{
-    self as engine, BREAKS, FAILS, NORMAL, PRESSES, held, held_or, set, shown, whole,
-};
+use super::engine_levers::{self as engine, FAILS, NORMAL, PRESSES, held, held_or, set, shown, whole};
 use super::grid::Condition;
 use super::load::Demand;
 use super::{Plant, sisters};
@@ -156,17 +154,13 @@ impl Plant {
             "fuel.pump" => shown(&FAILS, self.tank.pump_failed),
             "breaker.genset" => shown(&BREAKERS, self.genset_breaker.stuck),
             "breaker.mains" => shown(&BREAKERS, self.mains_breaker.stuck),
-            "sender.oil_pressure" => shown(&BREAKS, self.senders.oil_pressure),
-            "sender.temperature" => shown(&BREAKS, self.senders.temperature),
-            "sender.fuel_level" => shown(&BREAKS, self.senders.fuel_level),
-            "pickup" => shown(&BREAKS, self.senders.pickup),
             "emergency_stop" => shown(&PRESSES, self.emergency_stop),
             "remote_start" => shown(&CLOSES, self.remote_start),
             "busbar.gensets" => {
                 let sisters = self.sisters.wanted;
                 held_or("none", (sisters > 0).then_some(f64::from(sisters)))
             }
-            _ => engine::lever(id, &self.engine, &self.tank, &self.batteries[0]),
+            _ => engine::lever(id, &self.engine, &self.tank, &self.batteries[0], self.senders),
         }
     }
 
@@ -190,14 +184,13 @@ impl Plant {
             "fuel.pump" => set(&FAILS, to, |failed| self.tank.pump_failed = failed),
             "breaker.genset" => set(&BREAKERS, to, |stuck| self.genset_breaker.stuck = stuck),
             "breaker.mains" => set(&BREAKERS, to, |stuck| self.mains_breaker.stuck = stuck),
-            "sender.oil_pressure" => set(&BREAKS, to, |broken| self.senders.oil_pressure = broken),
-            "sender.temperature" => set(&BREAKS, to, |broken| self.senders.temperature = broken),
-            "sender.fuel_level" => set(&BREAKS, to, |broken| self.senders.fuel_level = broken),
-            "pickup" => set(&BREAKS, to, |broken| self.senders.pickup = broken),
             "emergency_stop" => set(&PRESSES, to, |pressed| self.emergency_stop = pressed),
             "remote_start" => set(&CLOSES, to, |closed| self.remote_start = closed),
             "busbar.gensets" => self.sisters.wanted = held(to).map_or(0, whole),
-            _ => engine::pull(id, to, &mut self.engine, &mut self.tank, &mut self.batteries),
+            _ => {
+                let batteries = &mut self.batteries;
+                engine::pull(id, to, &mut self.engine, &mut self.tank, batteries, &mut self.senders);
+            }
         }
     }
 }

@@ -17,6 +17,9 @@ const DAY: [f64; 24] = [
 const EVEN: [f64; 3] = [0.342, 0.331, 0.327];
 const UNEVEN: [f64; 3] = [0.55, 0.27, 0.18];
 
+/// Part of the load that can be spared.
+const SPARED: f64 = 0.2;
+
 /// What the consumers want.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Demand {
@@ -34,6 +37,8 @@ pub(super) struct Load {
     /// None where it wanders.
     pub(super) power_factor: Option<f64>,
     pub(super) uneven: bool,
+    /// What can be spared is switched off.
+    pub(super) shed: bool,
     base: Drift,
     wander: Drift,
     shares: [Drift; 3],
@@ -47,6 +52,7 @@ impl Load {
             demand: Demand::Varies,
             power_factor: None,
             uneven: false,
+            shed: false,
             base: Drift::new(2.5, 90.0, random),
             wander: Drift::new(0.012, 60.0, random),
             shares: std::array::from_fn(|_| Drift::new(0.008, 120.0, random)),
@@ -58,7 +64,8 @@ impl Load {
     /// kW and kvar of each phase at these voltages, in the tenths that the controllers' meters resolve: totals are then
     /// the exact sums of what is shown.
     pub(super) fn step(&mut self, dt: f64, hour: f64, volts: [f64; 3], random: &mut Random) -> PhaseLoads {
-        let wanted = tenth(self.wanted(dt, hour, random));
+        let part = if self.shed { 1.0 - SPARED } else { 1.0 };
+        let wanted = tenth(part * self.wanted(dt, hour, random));
         let wander = self.wander.step(dt, random);
         let power_factor = self.power_factor.unwrap_or(0.885 + wander);
         let reactive_part = (1.0 - power_factor * power_factor).max(0.0).sqrt() / power_factor;

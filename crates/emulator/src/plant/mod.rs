@@ -81,6 +81,8 @@ pub(crate) struct Controls {
     pub(crate) genset_breaker: bool,
     /// Mains breaker commanded closed.
     pub(crate) mains_breaker: bool,
+    /// Consumers that can be spared are switched off.
+    pub(crate) load_shedding: bool,
 }
 
 /// The whole of it; a panel reads the fields and hands back [`Controls`].
@@ -161,6 +163,7 @@ impl Plant {
         approach(&mut self.canopy, self.ambient + warmer, 240.0, dt);
         self.mains_breaker.step(dt, controls.mains_breaker);
         self.genset_breaker.step(dt, controls.genset_breaker);
+        self.load.shed = controls.load_shedding;
 
         let starter = controls.starter && !self.emergency_stop;
         let inputs = Inputs {

@@ -2,17 +2,18 @@
 
 use std::time::Duration;
 
+use busbar_profile::text::shown;
 use busbar_profile::{DateTime, Findings, builtins};
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 use super::step::Stage;
 use super::{Scenario, Step};
 use crate::config::Config;
 use crate::device::Device;
-use crate::notes::text::shown;
-use crate::notes::{self, Entry, Notes, entries};
+use crate::notes::{self, Entry, Notes, Place, entries};
 
 const FILE: [&str; 2] = ["scenario", "steps"];
+const TWICE: &str = "leave one of them; what happens twice takes two steps";
 const HEAD: [&str; 8] = ["title", "about", "controller", "model", "seed", "clock", "lasts", "settings"];
 
 const USUAL: Duration = Duration::from_secs(3600);
@@ -21,7 +22,7 @@ const LONGEST: Duration = Duration::from_secs(14 * 86_400);
 const SHORTEST: Duration = Duration::from_secs(1);
 
 pub(super) fn scenario(file: &str, text: &str) -> Result<Scenario, Findings> {
-    let scenario = notes::read(file, text, |root, notes| read(file, root, notes))?;
+    let scenario = notes::read(file, text, TWICE, |root, notes| read(file, root, notes))?;
     // Without a finding there is a scenario; an empty one plays to its end at once.
     Ok(scenario.unwrap_or_else(|| nothing(file)))
 }
@@ -41,7 +42,8 @@ fn read(file: &str, root: &DeTable<'_>, notes: &mut Notes<'_>) -> Option<Scenari
         return None;
     };
     let (mut scenario, probe) = self::head(file, &head, notes)?;
-    let Some(steps) = steps else {
+    let none = |entry: &Entry<'_, '_>| entry.value.get_ref().as_array().is_some_and(|steps| steps.is_empty());
+    let Some(steps) = steps.filter(|steps| !none(steps)) else {
         let help = "add [[steps]] with at = \"10s\" and what happens then, such as mains = \"failed\"";
         notes.add(head.span, "this scenario has no steps", help);
         return None;
@@ -55,11 +57,14 @@ fn head(file: &str, head: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<(Scen
     let mut scenario = nothing(file);
     let (mut controller, mut model, mut settings) = (None, None, None);
     let mut titled = false;
-    for entry in notes.table(head)? {
+    let Some(table) = head.value.get_ref().as_table() else {
+        return notes.wrong_type(head, "[scenario] above its keys, once");
+    };
+    for entry in entries(table) {
         match entry.key.as_str() {
             "title" => {
                 titled = true;
-                scenario.title = notes.title(&entry).unwrap_or_default();
+                scenario.title = notes.line(&entry, 100).unwrap_or_default();
             }
             "about" => scenario.about = notes.text(&entry),
             "controller" => controller = Some(entry),
@@ -79,6 +84,7 @@ fn head(file: &str, head: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<(Scen
         return None;
     };
     scenario.profile = notes.profile(&controller)?;
+    scenario.place = notes.place(controller.value.span().start);
     if let Some(entry) = &model {
         scenario.model = Some(notes.text(entry)?);
     }
@@ -98,7 +104,11 @@ fn head(file: &str, head: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<(Scen
 }
 
 fn clock(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<DateTime> {
-    let text = notes.text(entry)?;
+    let text = match entry.value.get_ref() {
+        // A date of TOML itself is as good.
+        DeValue::Datetime(date) => date.to_string(),
+        _ => notes.text(entry)?,
+    };
     let clock = text.parse().ok();
     if clock.is_none() {
         let help = "write a local time, such as \"2026-01-05T10:00:00\"";
@@ -108,18 +118,21 @@ fn clock(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<DateTime> {
 }
 
 fn steps(scenario: &Scenario, probe: Device, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Vec<Step> {
-    let tables = entry.value.get_ref().as_array();
-    let Some(tables) = tables.filter(|tables| !tables.is_empty()) else {
+    let Some(tables) = entry.value.get_ref().as_array() else {
         notes.wrong_type::<()>(entry, "a list of tables, each headed [[steps]]");
         return Vec::new();
     };
     let mut stage = Stage::new(scenario.profile, probe, scenario.clock, scenario.lasts);
     let mut steps = Vec::new();
     for item in tables.iter() {
+        if notes.is_full() {
+            break;
+        }
         match item.get_ref().as_table() {
             Some(table) => steps.extend(stage.step(table, item.span(), notes)),
             None => {
-                notes.wrong_type::<()>(entry, "a list of tables, each headed [[steps]]");
+                let entry = Entry { key: entry.key.clone(), span: item.span(), value: item };
+                notes.wrong_type::<()>(&entry, "a list of tables, each headed [[steps]]");
             }
         }
     }
@@ -131,6 +144,7 @@ fn nothing(file: &str) -> Scenario {
     let Config { seed, epoch, .. } = Config::default();
     Scenario {
         file: file.to_owned(),
+        place: Place { line: 1, column: 1 },
         title: String::new(),
         about: None,
         profile: &builtins()[0],

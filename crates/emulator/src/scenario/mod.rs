@@ -33,6 +33,8 @@ pub use report::{Check, CheckVerdict, Event, EventKind, Report, Seen};
 #[derive(Clone, Debug)]
 pub struct Scenario {
     file: String,
+    /// Where it names its controller.
+    place: Place,
     title: String,
     about: Option<String>,
     profile: &'static Profile,
@@ -104,6 +106,12 @@ impl Scenario {
     /// What it is about, where it says so.
     pub fn about(&self) -> Option<&str> {
         self.about.as_deref()
+    }
+
+    /// Where it names its controller, as `file:line:column`.
+    pub fn place(&self) -> String {
+        let Self { file, place: Place { line, column }, .. } = self;
+        format!("{file}:{line}:{column}")
     }
 
     /// Key of the profile that its controller has.

@@ -3,11 +3,12 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use busbar_profile::text::{duration, in_words, shown};
 use busbar_profile::{Number, Profile, nearest};
 
 use super::condition::{Comparison, Condition};
+use crate::device::STEP;
 use crate::facts::{FactKind, Subject};
-use crate::notes::text::{duration, shown};
 
 /// Longest condition, in bytes: what is deeper nested than this nobody reads.
 const LONGEST: usize = 500;
@@ -59,6 +60,8 @@ pub(super) fn wish(profile: &'static Profile, text: &str) -> Result<Wish, Mistak
     }
 }
 
+/// Words that no name stands for.
+const KEYWORDS: [&str; 4] = ["and", "or", "within", "for"];
 const JOIN: &str = "join conditions with `and` or `or`";
 
 /// A piece of the text: a name, a number, a word, an operator or a parenthesis.
@@ -172,7 +175,13 @@ impl<'t> Parser<'t> {
                 _ => Err(close.mistake("a parenthesis is open here", "close it, or join with `and` or `or`")),
             };
         }
-        if !first.is_word() || matches!(first.text, "and" | "or" | "within" | "for") {
+        if first.text.parse::<Number>().is_ok() {
+            return Err(first.mistake(
+                format!("`{}` stands where a name is expected", shown(first.text)),
+                "write the name first, such as `fuel.level > 5`",
+            ));
+        }
+        if !first.is_word() || KEYWORDS.contains(&first.text) {
             return Err(first.mistake(
                 format!("`{}` stands where a name is expected", shown(first.text)),
                 "write what is compared, such as `state.engine == loaded`, or a flag alone",
@@ -210,7 +219,10 @@ impl<'t> Parser<'t> {
                 format!("write `{0}`, or `not {0}`", name.text),
             )),
             FactKind::Number { unit } => match value.text.parse::<Number>() {
-                Ok(number) => Ok(Condition::Number(subject, comparison, number)),
+                Ok(number) => {
+                    self.no_unit(&subject)?;
+                    Ok(Condition::Number(subject, comparison, number))
+                }
                 Err(_) => Err(value.mistake(
                     format!("`{}` is a number, `{}` is none", name.text, shown(value.text)),
                     match unit {
@@ -223,6 +235,19 @@ impl<'t> Parser<'t> {
         }
     }
 
+    /// A unit behind a number is one too many.
+    fn no_unit(&self, subject: &Subject) -> Result<(), Mistake> {
+        let FactKind::Number { unit: Some(unit) } = subject.kind() else { return Ok(()) };
+        match self.peek() {
+            Some(token) if token.text == ")" || KEYWORDS.contains(&token.text) => Ok(()),
+            Some(token) => Err(token.mistake(
+                format!("`{}` is one too many", shown(token.text)),
+                format!("leave a unit out, `{}` is in {unit}; {JOIN}", subject.name()),
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// A duration behind a keyword, if the keyword is there.
     fn time(&mut self, keyword: &str) -> Result<Option<Duration>, Mistake> {
         if !self.take(keyword) {
@@ -230,6 +255,10 @@ impl<'t> Parser<'t> {
         }
         let token = self.token("a duration, such as 10s")?;
         match duration(token.text) {
+            Some(time) if time < STEP => Err(token.mistake(
+                format!("`{keyword}` is {}", token.text),
+                format!("give it {} or more, or leave it out", in_words(STEP)),
+            )),
             Some(time) => Ok(Some(time)),
             None => Err(token.mistake(
                 format!("`{}` is no duration", shown(token.text)),

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use busbar_profile::DateTime;
+use busbar_profile::text::in_words;
 
 use super::condition::Condition;
 use super::expectation::Watch;
@@ -13,7 +14,6 @@ use super::report::Seen;
 use super::{Action, Check, CheckVerdict, Event, EventKind, Report, Scenario, Step, Trigger};
 use crate::device::{Device, STEP};
 use crate::notes::Place;
-use crate::notes::text::in_words;
 
 /// A scenario under way.
 #[derive(Debug)]

@@ -4,12 +4,12 @@ use std::ops::Range;
 use std::time::Duration;
 
 use busbar_profile::command::{Proof, Verdict};
+use busbar_profile::text::{in_words, shown};
 use busbar_profile::{DateTime, Profile, nearest};
 use toml::de::DeTable;
 
 use super::{Action, Expectation, Step, Trigger, parse};
-use crate::device::Device;
-use crate::notes::text::{in_words, shown};
+use crate::device::{Device, STEP};
 use crate::notes::{Entry, Notes, flat};
 
 /// Keys of a step that are no levers. No plant has a lever of such a name.
@@ -19,6 +19,7 @@ pub(super) const KEYS: [&str; 14] = [
 ];
 /// Those whose values are tables.
 const TABLES: [&str; 3] = ["set", "settings", "args"];
+const LONGEST_NOTE: usize = 500;
 const VERDICTS: [Verdict; 4] = [Verdict::Done, Verdict::Refused, Verdict::NoEffect, Verdict::Unknown];
 
 /// What the steps are held against, one after the other.
@@ -58,6 +59,9 @@ impl Stage {
         let mut keys = Keys::default();
         let mut actions = Vec::new();
         for entry in flat(table, &TABLES) {
+            if notes.is_full() {
+                break;
+            }
             match entry.key.as_str() {
                 "at" | "after" | "when" => keys.triggers.push(entry),
                 "within" => keys.within = Some(entry),
@@ -110,8 +114,8 @@ impl Stage {
         match entry.key.as_str() {
             "at" => self.at(entry, notes),
             "after" => {
-                let time = notes.duration(entry, Duration::ZERO..=self.lasts)?;
-                self.earliest += time;
+                let time = notes.duration(entry, Duration::ZERO..=Duration::MAX)?;
+                self.earliest = self.earliest.saturating_add(time);
                 self.is_in_time(self.earliest, entry.value.span(), notes).then_some(Trigger::After(time))
             }
             _ => self.when(entry, keys.within.as_ref(), notes),
@@ -119,7 +123,10 @@ impl Stage {
     }
 
     fn at(&mut self, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<Trigger> {
-        let time = notes.duration(entry, Duration::ZERO..=self.lasts)?;
+        let time = notes.duration(entry, Duration::ZERO..=Duration::MAX)?;
+        if !self.is_in_time(time, entry.value.span(), notes) {
+            return None;
+        }
         if time < self.earliest {
             let message = format!(
                 "this step comes at {}, those before it not before {}",
@@ -145,11 +152,17 @@ impl Stage {
     ) -> Option<Trigger> {
         let text = notes.text(entry)?;
         let within = match within {
-            Some(within) => Some(notes.duration(within, Duration::from_millis(1)..=self.lasts)?),
+            Some(within) => {
+                let time = notes.duration(within, STEP..=self.lasts)?;
+                if !self.is_in_time(self.earliest.saturating_add(time), within.value.span(), notes) {
+                    return None;
+                }
+                Some(time)
+            }
             None => None,
         };
         match parse::condition(self.profile, &text) {
-            Ok(condition) => Some(Trigger::When { condition, text, within }),
+            Ok(condition) => Some(Trigger::When { condition, text: one_line(&text), within }),
             Err(mistake) => {
                 let span = notes.inside(&entry.value.span(), &text, &mistake.span);
                 notes.add(span, mistake.message, mistake.help);
@@ -162,11 +175,11 @@ impl Stage {
         let fits = time <= self.lasts;
         if !fits {
             let message = format!(
-                "this is not over before {}, the scenario lasts {}",
+                "this comes at {} or later, the scenario lasts {}",
                 in_words(time),
                 in_words(self.lasts)
             );
-            notes.add(span, message, "shorten it, or give the scenario more time with `lasts`");
+            notes.add(span, message, "bring it forward, or give the scenario more time with `lasts`");
         }
         fits
     }
@@ -179,20 +192,20 @@ impl Stage {
             "set" => self.pins(entry, notes),
             "unset" => self.unpins(entry, notes),
             "settings" => self.settings(entry, notes),
-            "note" => notes.text(entry).map(Action::Note).into_iter().collect(),
+            "note" => notes.line(entry, LONGEST_NOTE).map(Action::Note).into_iter().collect(),
             _ => self.lever(entry, notes).into_iter().collect(),
         }
     }
 
     fn lever(&mut self, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<Action> {
-        if self.probe.levers().iter().all(|lever| lever.id != entry.key) {
+        let Some(lever) = self.probe.levers().iter().find(|lever| lever.id == entry.key) else {
             let (message, help) = self.no_lever(&entry.key);
             notes.add(entry.span.clone(), message, help);
             return None;
-        }
+        };
         let to = notes.plain(entry)?;
-        match self.probe.pull(&entry.key, &to) {
-            Ok(()) => Some(Action::Pull { lever: entry.key.clone(), to }),
+        match lever.position(&to) {
+            Ok(position) => Some(Action::Pull { lever: entry.key.clone(), to: position.to_string() }),
             Err(error) => {
                 notes.add_error(entry.value.span(), &error);
                 None
@@ -221,6 +234,9 @@ impl Stage {
     fn alarms(&mut self, entry: &Entry<'_, '_>, active: bool, notes: &mut Notes<'_>) -> Vec<Action> {
         let mut actions = Vec::new();
         for (alarm, span) in notes.texts(entry) {
+            if notes.is_full() {
+                break;
+            }
             match self.probe.inject(&alarm, active) {
                 Ok(()) => actions.push(Action::Inject { alarm, active }),
                 Err(error) => notes.add_error(span, &error),
@@ -232,6 +248,9 @@ impl Stage {
     fn pins(&mut self, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Vec<Action> {
         let mut actions = Vec::new();
         for entry in notes.table(entry).unwrap_or_default() {
+            if notes.is_full() {
+                break;
+            }
             if !self.has_point(&entry.key, entry.span.clone(), notes) {
                 continue;
             }
@@ -250,7 +269,7 @@ impl Stage {
     fn unpins(&mut self, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Vec<Action> {
         let mut actions = Vec::new();
         for (point, span) in notes.texts(entry) {
-            if self.has_point(&point, span, notes) {
+            if !notes.is_full() && self.has_point(&point, span, notes) {
                 actions.push(Action::Unpin { point });
             }
         }
@@ -325,11 +344,15 @@ impl Stage {
     fn expectations(&self, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Vec<Expectation> {
         let mut expectations = Vec::new();
         for (text, span) in notes.texts(entry) {
+            if notes.is_full() {
+                break;
+            }
             match parse::wish(self.profile, &text) {
                 Ok(wish) => {
                     let takes =
                         wish.within.unwrap_or_default().saturating_add(wish.lasting.unwrap_or_default());
                     if self.is_in_time(self.earliest.saturating_add(takes), span.clone(), notes) {
+                        let text = one_line(&text);
                         expectations.push(Expectation { place: notes.place(span.start), text, wish });
                     }
                 }
@@ -341,6 +364,11 @@ impl Stage {
         }
         expectations
     }
+}
+
+/// A condition as a report tells it.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 fn verdict(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<Verdict> {

@@ -250,7 +250,7 @@ fn a_scenario_belongs_to_its_controller() {
     let config = Config { profile: "smartgen-hat821si".to_owned(), ..scenario.config() };
     assert_eq!(
         Device::new(&config).unwrap_err().to_string(),
-        "the scenario \"A test\" is for datakom-d, not for smartgen-hat821si; imitate datakom-d, or choose another one"
+        "a.toml:3:14: this scenario is for datakom-d, not for smartgen-hat821si; imitate datakom-d, or choose another one"
     );
 }
 
@@ -264,14 +264,42 @@ fn no_lever_is_called_like_a_key_of_a_step() {
     }
 }
 
+/// Line for line as people write it who have read no list of words.
+#[test]
+fn a_step_is_written_as_a_person_tells_it() {
+    let report = play(
+        "[[steps]]\nat = \"10s\"\nmains = \"fails\"\nexpect = \"mains.failed within 12s\"\n\
+         [[steps]]\nwhen = \"state.engine == cranking\"\ninject = \"coolant_temperature_high\"\n\
+         expect = \"shutdown_alarms.high_engine_temperature within 1s\"\n\
+         [[steps]]\nafter = \"5s\"\nmains = \"returns\"\n",
+    );
+    assert_eq!(report.held, Some(true), "{report:#?}");
+    let actions = report.events.iter().filter(|event| event.kind == EventKind::Action);
+    assert_eq!(
+        actions.map(|event| event.text.as_str()).collect::<Vec<_>>(),
+        ["mains = failed", "inject coolant_temperature_high", "mains = normal"]
+    );
+}
+
+#[test]
+fn a_file_full_of_mistakes_is_judged_at_once() {
+    let many = |one: &str, count: usize| one.repeat(count);
+    for steps in [
+        many("[[steps]]\nat = \"1s\"\nmains = \"gone\"\n", 500),
+        format!("[[steps]]\nat = \"1s\"\nexpect = [{}]", many("\"nope\", ", 50_000)),
+        format!("[[steps]]\nat = \"1s\"\ninject = [{}]", many("\"nope\", ", 50_000)),
+        (0..5_000).fold("[[steps]]\nat = \"1s\"\n".to_owned(), |text, key| text + &format!("k{key} = 1\n")),
+    ] {
+        let findings = parse(&steps).map(|_| ()).unwrap_err();
+        assert!((100..=102).contains(&findings.iter().count()), "{}", findings.iter().count());
+    }
+}
+
 /// Steps with a mistake each, and the finding: line within the steps, column, message and remedy.
 #[test]
 fn mistakes_are_found_with_their_place_and_remedy() {
     for (steps, expected) in [
-        (
-            "[[steps]]\nat = \"1s\"\nmains = \"fails\"",
-            "6:9: `mains` cannot be `fails`; choose normal, failed",
-        ),
+        ("[[steps]]\nat = \"1s\"\nmains = \"gone\"", "6:9: `mains` cannot be `gone`; choose normal, failed"),
         (
             "[[steps]]\nat = \"1s\"\nmians = \"failed\"",
             "6:1: the plant of datakom-d has no `mians`; did you mean `mains`?",
@@ -312,7 +340,46 @@ fn mistakes_are_found_with_their_place_and_remedy() {
             "[[steps]]\nat = \"1\"\nmains = \"failed\"",
             "5:6: `1` is no duration; write a number and ms, s, min or h, such as \"500ms\" or \"10s\"",
         ),
-        ("[[steps]]\nat = \"2h\"\nmains = \"failed\"", "5:6: `at` is 2h; write a duration from 0s to 1h"),
+        (
+            "[[steps]]\nat = \"2h\"\nmains = \"failed\"",
+            "5:6: this comes at 2h or later, the scenario lasts 1h; bring it forward, or give the scenario more time with `lasts`",
+        ),
+        (
+            "[[steps]]\nat = \"59min\"\nmains = \"failed\"\n[[steps]]\nwhen = \"engine.running\"\nwithin = \"5min\"",
+            "9:10: this comes at 64min or later, the scenario lasts 1h",
+        ),
+        (
+            "[[steps]]\nat = \"1s\"\nnote = \"\"",
+            "6:8: this is no note; write 1 to 500 characters on one line",
+        ),
+        (
+            "[[steps]]\nat = \"1s\"\nnote = \"\\u001b[2J\"",
+            "6:8: this is no note; write 1 to 500 characters on one line",
+        ),
+        (
+            "[[steps]]\nat = \"1s\"\nmains = \"\\u001b[2J\\u202Egone\"",
+            "6:9: `mains` cannot be `\\u{1b}[2J\\u{202e}gone`; choose normal",
+        ),
+        (
+            "[[steps]]\nat = \"1s\"\nload = 99999999999999999999",
+            "6:8: `load` is 99999999999999999999; write a smaller number",
+        ),
+        (
+            "[[steps]]\nat = \"1s\"\nmains = \"failed\"\nmains = \"normal\"",
+            "7:1: this is not TOML: duplicate key; leave one of them; what happens twice takes two steps",
+        ),
+        (
+            "[[steps]]\nat = \"1s\"\nexpect = \"5 < fuel.level\"",
+            "6:11: `5` stands where a name is expected; write the name first, such as `fuel.level > 5`",
+        ),
+        (
+            "[[steps]]\nat = \"1s\"\nexpect = \"genset.power.active > 10 kW within 5s\"",
+            "6:36: `kW` is one too many; leave a unit out, `genset.power.active` is in kW",
+        ),
+        (
+            "[[steps]]\nat = \"1s\"\nexpect = \"engine.running within 0s\"",
+            "6:33: `within` is 0s; give it 100ms or more, or leave it out",
+        ),
         (
             "[[steps]]\nat = \"5s\"\nmains = \"failed\"\n[[steps]]\nat = \"4s\"\nmains = \"normal\"",
             "8:6: this step comes at 4s, those before it not before 5s; steps are taken in the order of the file: move it up, \
@@ -340,7 +407,7 @@ fn mistakes_are_found_with_their_place_and_remedy() {
         ),
         (
             "[[steps]]\nat = \"1s\"\nexpect = \"fuel.level > 5%\"",
-            "6:25: `%` is one too many; join conditions with `and` or `or`; `within 10s` and `for 30s` end an expectation, in this order",
+            "6:25: `%` is one too many; leave a unit out, `fuel.level` is in %; join conditions with `and` or `or`",
         ),
         (
             "[[steps]]\nat = \"1s\"\nexpect = \"fuel.level = 5\"",
@@ -360,7 +427,7 @@ fn mistakes_are_found_with_their_place_and_remedy() {
         ),
         (
             "[[steps]]\nat = \"1s\"\nexpect = \"engine.running within 2h\"",
-            "6:10: this is not over before 7201s, the scenario lasts 1h; shorten it, or give the scenario more time with `lasts`",
+            "6:10: this comes at 7201s or later, the scenario lasts 1h; bring it forward, or give the scenario more time with `lasts`",
         ),
         (
             "[[steps]]\nat = \"1s\"\nexpect = \"(engine.running or mode == off\"",
@@ -380,7 +447,7 @@ fn mistakes_are_found_with_their_place_and_remedy() {
         ),
         (
             "[[steps]]\nat = \"1s\"\ninject = \"coolant_temperature_hgh\"",
-            "6:10: the controller has no alarm `coolant_temperature_hgh`; `busbar profile show` lists the bits with a class",
+            "6:10: the controller has no alarm `coolant_temperature_hgh`; did you mean coolant_temperature_high?",
         ),
         (
             "[[steps]]\nat = \"1s\"\nset = { fuel_levl = 5 }",
@@ -412,7 +479,7 @@ fn mistakes_are_found_with_their_place_and_remedy() {
         ),
         (
             "[[steps]]\nat = \"1s\"\nsettings = { warp = 9 }",
-            "6:14: the controller has no setting `warp`; correct it",
+            "6:14: the controller has no setting `warp`; docs/imitation/datakom-d.md lists them",
         ),
         (
             "[steps]\nat = \"1s\"",
@@ -454,7 +521,7 @@ fn heads_are_checked_too() {
         ),
         (
             "[scenario]\ntitle = \"x\"\ncontroller = \"datakom-d\"\nseed = -1",
-            "4:8: `seed` has the wrong type (integer); write a whole number from 0 on",
+            "4:8: `seed` is -1; write a whole number from 0 to 18446744073709551615",
         ),
         ("[scenario]\ntitle = \"x\"\ncontroller = \"datakom-d\"\nlasts = \"1y\"", "4:9: `1y` is no duration"),
         (

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use busbar_profile::text::shown;
+
 use crate::MAX_SPEED;
 
 /// A clock that was held up (a sleeping laptop, a debugger) does not make up for more than this.
@@ -22,7 +24,7 @@ pub struct Pace {
 
 /// No simulated clock runs like that.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("speed {speed} is not possible, choose a number above 0 and up to {MAX_SPEED}")]
+#[error("speed {} is not possible, choose a number above 0 and up to {MAX_SPEED}", shown(.speed))]
 pub struct SpeedError {
     /// What was asked for, as text.
     pub speed: String,

@@ -10,6 +10,7 @@ use busbar_modbus::{ExceptionCode, Framing, Losses, Request, Response, mbap, rtu
 use tokio::sync::{Semaphore, watch};
 
 use crate::device::Device;
+use crate::faults::{Faults, Mischief, Struck};
 
 /// What has happened on the wires of an imitation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,6 +69,8 @@ pub(super) struct Door {
     pub(super) places: Arc<Semaphore>,
     pub(super) idle: Duration,
     statistics: Mutex<Statistics>,
+    /// What goes wrong here, if anything does.
+    mischief: Option<Mutex<Mischief>>,
 }
 
 /// What came of a batch of requests.
@@ -77,6 +80,8 @@ pub(super) struct Outcome {
     pub(super) delay: Duration,
     /// A device restarts because of it.
     pub(super) restarting: bool,
+    /// The connection ends in place of an answer.
+    pub(super) hangs_up: bool,
 }
 
 impl Door {
@@ -85,8 +90,10 @@ impl Door {
         devices: Vec<(u8, Arc<Served>)>,
         places: Arc<Semaphore>,
         idle: Duration,
+        faults: Option<&Faults>,
     ) -> Self {
-        Self { endpoint, devices, places, idle, statistics: Mutex::default() }
+        let mischief = faults.map(|faults| Mutex::new(Mischief::new(faults)));
+        Self { endpoint, devices, places, idle, statistics: Mutex::default(), mischief }
     }
 
     pub(super) fn framing(&self) -> Framing {
@@ -124,12 +131,29 @@ impl Door {
         }
         self.statistics().requests += 1;
         let device = device.as_mut()?;
-        let response = device.answer(frame.unit, &request)?;
-        if !encode(framing, frame, &response, out) {
-            return None;
+        let mut mischief = self.mischief();
+        let struck = mischief.as_mut().and_then(|mischief| mischief.strike(frame, device.time()));
+        let start = out.len();
+        if struck.is_none_or(Struck::is_heard) {
+            let response = device.answer(frame.unit, &request)?;
+            if !encode(framing, frame, &response, out) {
+                return None;
+            }
         }
-        self.statistics().answers += 1;
-        Some(Outcome { delay: device.answer_delay(), restarting: device.is_silent() })
+        if let Some(mischief) = &mut mischief {
+            mischief.spoil(struck, framing, frame, out, start);
+        }
+        let late = struck.map_or(Duration::ZERO, Struck::delay);
+        self.statistics().answers += u64::from(out.len() > start);
+        Some(Outcome {
+            delay: device.answer_delay() + late,
+            restarting: device.is_silent(),
+            hangs_up: struck.is_some_and(Struck::hangs_up),
+        })
+    }
+
+    fn mischief(&self) -> Option<MutexGuard<'_, Mischief>> {
+        self.mischief.as_ref().map(|mischief| mischief.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Tells every connection of the devices that restart.
@@ -145,7 +169,11 @@ impl Door {
 impl Outcome {
     /// The outcome of several requests together.
     pub(super) fn and(self, other: Self) -> Self {
-        Self { delay: self.delay.max(other.delay), restarting: self.restarting || other.restarting }
+        Self {
+            delay: self.delay.max(other.delay),
+            restarting: self.restarting || other.restarting,
+            hangs_up: self.hangs_up || other.hangs_up,
+        }
     }
 }
 

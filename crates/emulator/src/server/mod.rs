@@ -132,7 +132,8 @@ async fn serve(
             }
         }
         let devices = room.members(&served).map(|(unit, _, device)| (*unit, Arc::clone(device))).collect();
-        let door = Arc::new(Door::new(url.clone(), devices, room.places, room.idle));
+        let faults = room.members.iter().find_map(|index| configs.get(*index)?.faults.as_ref());
+        let door = Arc::new(Door::new(url.clone(), devices, room.places, room.idle, faults));
         socket.open(Arc::clone(&door), &mut tasks);
         urls.push(url);
         doors.push(door);

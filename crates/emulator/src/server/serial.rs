@@ -110,7 +110,9 @@ async fn attend(
             out.clear();
             let frame = Frame { transaction: 0, unit: arrival.unit, pdu: &arrival.pdu };
             if let Some(outcome) = door.answer(&frame, &mut out) {
-                line.answer(&arrival, &out, outcome.delay);
+                if !out.is_empty() {
+                    line.answer(&arrival, &out, outcome.delay);
+                }
                 if outcome.restarting {
                     door.announce_restarts();
                 }

@@ -94,7 +94,7 @@ async fn serve(mut stream: TcpStream, door: Arc<Door>, _place: OwnedSemaphorePer
             door.announce_restarts();
         }
         let dropped_by_restart = outcome.restarting && door.owner().is_some();
-        if dropped_by_restart || !sent || conversation.decoder.fault().is_some() {
+        if dropped_by_restart || outcome.hangs_up || !sent || conversation.decoder.fault().is_some() {
             return;
         }
     }

@@ -111,10 +111,6 @@ impl Alarms {
         BitSet::from_registers(&[word.map_or(0, Word::active)])
     }
 
-    pub(super) fn is_active(&self, (register, bit): (u16, u16)) -> bool {
-        self.word(register).contains(bit)
-    }
-
     pub(super) fn any_shutdown(&self) -> bool {
         SHUTDOWNS.into_iter().any(|register| !self.word(register).is_empty())
     }

@@ -88,9 +88,7 @@ const WATCHES: [Watch; 24] = [
     watch((20, 0), |s| s.overspeed.delay, |v| high(v.readings.speed, v.setup.overspeed.warning, RPM)),
     watch((20, 1), |s| s.underspeed.delay, |v| v.slow(v.setup.underspeed.warning)),
     watch((20, 2), |s| s.speed_loss_delay, |v| v.speed_lost(Action::Warning)),
-    watch((20, 3), at_once, |v| {
-        v.ecu.map_or(Verdict::Fine, |ecu| ecu.filter(|filter| filter.needs_a_person))
-    }),
+    watch((20, 3), at_once, |v| when(v.ecu.is_some_and(|ecu| ecu.filter().needs_a_person))),
     watch((20, 8), at_once, |v| when(v.sequence.status() == Status::StopFailure)),
     watch((20, 9), |s| s.charging_delay, |v| v.charging_fails()),
     watch((20, 10), |s| s.battery_delay, |v| above(v.readings.battery, v.setup.battery_high, VOLT)),
@@ -104,7 +102,7 @@ const WATCHES: [Watch; 24] = [
     ),
     watch((21, 6), |s| s.oil_pressure.delay, |v| v.low_oil(v.setup.oil_pressure.warning)),
     watch((23, 9), |s| s.discharge_pressure.delay, |v| v.high_pressure(v.setup.discharge_pressure.warning)),
-    watch(FILTER_FAULT, at_once, |v| v.ecu.map_or(Verdict::Fine, |ecu| ecu.filter(|filter| filter.failed))),
+    watch(FILTER_FAULT, at_once, |v| when(v.ecu.is_some_and(|ecu| ecu.filter().failed))),
 ];
 
 impl View<'_> {
@@ -169,11 +167,13 @@ fn inputs(view: &View<'_>, take: &mut impl FnMut(Judgement)) {
     }
 }
 
-/// Open, high and low of each sensor: a shutdown, and 19 registers on a warning.
+/// Open, high and low of each sensor: a shutdown, and 19 registers on a warning. And the error of the fourth.
 fn sensors(view: &View<'_>, take: &mut impl FnMut(Judgement)) {
     const SHUTDOWNS: [(u16, u16); 5] = [(2, 8), (2, 12), (3, 0), (3, 4), (3, 8)];
     const WARNINGS_FROM: u16 = 19;
     let delay = view.setup.sensor_delay;
+    let shorted = view.readings.sensors[3] == Reading::Shorted;
+    take(Judgement { at: (22, 7), delay, verdict: when(shorted) });
     for (index, (sensor, setup)) in view.readings.sensors.iter().zip(&view.setup.sensors).enumerate() {
         let (register, bit) = SHUTDOWNS[index];
         // A sensor of the engine's has the engine's alarms.
@@ -211,7 +211,7 @@ pub(super) fn when(cause: bool) -> Verdict {
 fn low(reading: Reading, limit: f64, hysteresis: f64) -> Verdict {
     match reading {
         Reading::Value(value) => below(value, limit, hysteresis),
-        Reading::Broken => Verdict::Between,
+        Reading::Broken | Reading::Shorted => Verdict::Between,
         Reading::Absent => Verdict::Fine,
     }
 }

@@ -24,8 +24,10 @@ pub(super) struct Ecu {
 /// What it says of the particle filter.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Filter {
-    /// It is clogged.
+    /// It is too full to be burned clean.
     pub(super) failed: bool,
+    /// Hardly any exhaust goes through it.
+    pub(super) plugged: bool,
     /// It is full and waits for a hot exhaust.
     pub(super) waits: bool,
     /// It burns its soot, in an exhaust that is hotter for it.
@@ -57,6 +59,7 @@ impl Ecu {
         };
         self.filter = Filter {
             failed: plant.filter.has_failed(),
+            plugged: plant.filter.is_plugged(),
             waits: plant.filter.is_waiting(),
             burns: plant.filter.is_regenerating(),
             needs_a_person: plant.filter.needs_a_person(),
@@ -64,7 +67,7 @@ impl Ecu {
             by_hand: plant.lever("dpf.regeneration") == Some(Position::Word("by_hand")),
         };
         self.warns = beyond(WARNS_AT) || blind || self.filter.failed || self.filter.needs_a_person;
-        self.stops = beyond(STOPS_AT);
+        self.stops = beyond(STOPS_AT) || self.filter.plugged;
     }
 
     pub(super) fn talks(&self) -> bool {
@@ -72,24 +75,15 @@ impl Ecu {
     }
 
     pub(super) fn warns(&self) -> Verdict {
-        self.says(self.warns)
+        when(self.talks && self.warns)
     }
 
     pub(super) fn stops(&self) -> Verdict {
-        self.says(self.stops)
+        when(self.talks && self.stops)
     }
 
-    /// What it says of the filter, as long as it does.
-    pub(super) fn shown(&self) -> Filter {
+    /// What it says of the filter: nothing, where it is silent.
+    pub(super) fn filter(&self) -> Filter {
         if self.talks { self.filter } else { Filter::default() }
-    }
-
-    pub(super) fn filter(&self, of: fn(&Filter) -> bool) -> Verdict {
-        self.says(of(&self.filter))
-    }
-
-    /// Of a silent one nobody knows.
-    fn says(&self, what: bool) -> Verdict {
-        if self.talks { when(what) } else { Verdict::Between }
     }
 }

@@ -36,7 +36,7 @@ impl LoadValve {
     }
 
     pub(super) fn step(&mut self, dt: Duration, demand: Demand, setup: &Setup) {
-        self.protect(dt, demand.engine_load, setup);
+        self.protect(dt, demand, setup);
         self.follow(demand, setup);
     }
 
@@ -44,7 +44,7 @@ impl LoadValve {
     pub(super) fn follow(&mut self, demand: Demand, setup: &Setup) {
         // Nobody fills a receiver whose pressure he does not know.
         let room = demand.pressure.is_some_and(|pressure| {
-            pressure < setup.load_pressure || self.open && pressure < setup.unload_pressure
+            pressure < setup.unload_pressure && (self.open || pressure < setup.load_pressure)
         });
         self.open = demand.loaded && room && !self.protects();
     }
@@ -55,11 +55,13 @@ impl LoadValve {
         self.follow(demand, setup);
     }
 
-    fn protect(&mut self, dt: Duration, engine_load: Option<f64>, setup: &Setup) {
-        let overloaded = engine_load.is_some_and(|load| load >= setup.overload_limit);
+    fn protect(&mut self, dt: Duration, demand: Demand, setup: &Setup) {
+        let overloaded = demand.engine_load.is_some_and(|load| load >= setup.overload_limit);
         self.overloaded_for = if overloaded { self.overloaded_for + dt } else { Duration::ZERO };
         self.rest = match self.rest {
-            None if overloaded && self.overloaded_for >= setup.overload_delay => Some(setup.overload_rest),
+            None if demand.loaded && overloaded && self.overloaded_for >= setup.overload_delay => {
+                Some(setup.overload_rest)
+            }
             Some(rest) if overloaded || rest > dt => Some(rest.saturating_sub(dt)),
             _ => None,
         };
@@ -84,6 +86,8 @@ mod tests {
                 &[("load_pressure", "500"), ("unload_pressure", "600")],
                 [0.0, 599.0, 580.0, 600.0, 501.0, 500.0, 499.0, 550.0, 700.0],
             ),
+            // The pressure at which it shuts has the last word.
+            (&[("load_pressure", "2000")], [0.0, 700.0, 749.0, 750.0, 751.0, 800.0, 700.0, 749.0, 750.0]),
         ] {
             let (setup, mut valve) = (Setup::with(changes), LoadValve::default());
             let opens = pressures.map(|pressure| {
@@ -129,6 +133,11 @@ mod tests {
         assert_eq!(pass(Some(110.0), 1), (false, true));
         assert_eq!(pass(Some(40.0), 19), (false, true));
         assert_eq!(pass(Some(40.0), 1), (true, false));
+        // Nothing can be taken from an engine that is not loaded.
+        let drag = Demand { loaded: false, engine_load: Some(130.0), ..demand(300.0) };
+        let mut unloaded = LoadValve::default();
+        (0..100).for_each(|_| unloaded.step(TENTH, drag, &setup));
+        assert!(!unloaded.protects());
         // An engine that stays overloaded, whatever the valve does, is not loaded again.
         assert_eq!(pass(Some(130.0), 100), (false, true));
         assert_eq!(pass(Some(40.0), 1), (true, false));

@@ -159,6 +159,7 @@ impl Acc1700 {
 
     fn press_stop(&mut self) {
         self.mode = Mode::Stop;
+        self.heating_left = Duration::ZERO;
         self.sequence.react(Cause::StopKey, &self.setup);
         self.valve.follow(self.demand(), &self.setup);
         self.sequence.acknowledge();
@@ -237,7 +238,7 @@ impl Acc1700 {
     }
 
     fn orders(&self) -> Orders {
-        Orders { load_valve: self.valve.is_open(), ..self.sequence.orders() }
+        Orders { load_valve: self.valve.is_open(), heater: self.is_heating(), ..self.sequence.orders() }
     }
 
     fn note(&mut self, events: u32) {
@@ -273,8 +274,13 @@ impl Panel for Acc1700 {
         self.note(new);
         if self.alarms.any_shutdown() {
             self.sequence.react(Cause::Shutdown, &self.setup);
+            self.heating_left = Duration::ZERO;
         }
         self.valve.step(dt, self.demand(), &self.setup);
+        if !self.sequence.status().is_running() {
+            // What stands is not protected.
+            self.valve = LoadValve::default();
+        }
         if status != Status::Standby && self.sequence.status() == Status::Standby {
             self.note(1);
         }

@@ -4,6 +4,9 @@ use crate::plant::Compressor;
 
 use super::Model;
 
+/// V from which a charge alternator is at work.
+const CHARGES: f64 = 10.0;
+
 /// One measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Reading {
@@ -12,13 +15,15 @@ pub(super) enum Reading {
     Absent,
     /// The sensor's wire is broken.
     Broken,
+    /// The sensor's wires touch.
+    Shorted,
 }
 
 impl Reading {
     pub(super) fn value(self) -> Option<f64> {
         match self {
             Self::Value(value) => Some(value),
-            Self::Absent | Self::Broken => None,
+            Self::Absent | Self::Broken | Self::Shorted => None,
         }
     }
 }
@@ -62,7 +67,10 @@ impl Readings {
         };
         let fuel_level = wired(engine.fuel_level);
         let pressure = wired(discharge.pressure);
-        let temperature = wired(discharge.temperature);
+        let temperature = match discharge.temperature_shorted {
+            true => Reading::Shorted,
+            false => wired(discharge.temperature),
+        };
         let (speed, coolant, oil_pressure, first, second) = match model {
             Model::Acc1700 => {
                 let (coolant, oil) = (wired(engine.coolant), wired(oil_pressure));
@@ -94,15 +102,15 @@ impl Readings {
         sensor < self.of_the_engine
     }
 
-    /// Whether the engine is seen to turn, by anything that tells of it, at least as fast as these.
+    /// Whether the engine is seen to turn, by anything that tells of it, faster than these.
     pub(super) fn turns(&self, speed: f64, oil_pressure: f64) -> bool {
-        match (self.speed.value(), self.oil_pressure.value()) {
-            // A charge alternator at work gives more than its lamp.
-            (None, None) => self.charger > 10.0,
-            (rpm, kilopascal) => {
-                rpm.is_some_and(|rpm| rpm > speed) || kilopascal.is_some_and(|found| found > oil_pressure)
+        let oiled = self.oil_pressure.value().is_some_and(|found| found > oil_pressure);
+        oiled
+            || match self.speed.value().filter(|rpm| *rpm > 0.0) {
+                Some(rpm) => rpm > speed,
+                // No pulses: a charge alternator at work gives more than its lamp.
+                None => self.charger > CHARGES,
             }
-        }
     }
 }
 

@@ -26,7 +26,7 @@ const OPEN_CIRCUIT: f64 = 6553.5;
 /// Stores all of them.
 pub(super) fn registers(unit: &Acc1700, bank: &mut Bank) {
     counters(unit, bank);
-    // These follow what the countdowns and then the alarm words show, pinned or not.
+    // These and the engine's fault follow what the countdowns and then the alarm words show, pinned or not.
     alarms(unit, bank);
     common_status(unit, bank);
     inputs_and_outputs(unit, bank);
@@ -101,8 +101,9 @@ fn indicators(unit: &Acc1700, bank: &mut Bank) {
 }
 
 fn engine_indicators(unit: &Acc1700, bank: &mut Bank) {
-    let filter = unit.ecu.as_ref().map(Ecu::shown).unwrap_or_default();
-    let engine_fault = [ECU_SHUTDOWN, ECU_WARNING].into_iter().any(|alarm| unit.alarms.is_active(alarm));
+    let filter = unit.ecu.as_ref().map(Ecu::filter).unwrap_or_default();
+    let said = |(register, bit): (u16, u16)| bank.bits_shown(register).contains(bit);
+    let engine_fault = said(ECU_SHUTDOWN) || said(ECU_WARNING);
     let mut engine = unit.alarms.word(FILTER_FAULT.0);
     engine.set(1, filter.waits);
     engine.set(2, filter.inhibited);
@@ -135,7 +136,9 @@ fn sensors(unit: &Acc1700, bank: &mut Bank) {
         match *sensor {
             Reading::Value(value) => bank.number(register, curve(value)),
             Reading::Broken => bank.number(register, open),
-            Reading::Absent => bank.absent(register),
+            Reading::Shorted => bank.number(register, 0.0),
+            // An open terminal, too.
+            Reading::Absent => bank.number(register, open),
         }
         // Whole units, as the register has them.
         measured(register + 1, *sensor, bank);
@@ -164,7 +167,7 @@ fn measured(register: u16, reading: Reading, bank: &mut Bank) {
     match reading {
         Reading::Value(value) => bank.number(register, value.round()),
         Reading::Absent => bank.absent(register),
-        Reading::Broken => bank.broken(register),
+        Reading::Broken | Reading::Shorted => bank.broken(register),
     }
 }
 

@@ -207,10 +207,16 @@ impl Sequence {
     pub(super) fn orders(&self) -> Orders {
         use Status::*;
         Orders {
-            fuel: (FuelOutput..=StopIdle).contains(&self.status),
+            // Without fuel between two cranks: an engine that fires too late does not run up unseen.
+            fuel: (FuelOutput..=StopIdle).contains(&self.status) && self.status != CrankRest,
             starter: self.status == Crank,
-            idle: matches!(self.status, SafetyOn | StartIdle | WaitToOnload | StopIdle),
+            // Nor does one that does not stop speed up again.
+            idle: match self.status {
+                SafetyOn | StartIdle | WaitToOnload => true,
+                status => status >= StopIdle,
+            },
             load_valve: false,
+            heater: false,
             blow_down: self.status == Standby || self.status >= Cooling,
         }
     }
@@ -334,6 +340,9 @@ mod tests {
             if cranked.get() > 170 { RUNNING } else { DEAD }
         });
         let attempts = [Crank, CrankRest, Crank, CrankRest, Crank];
+        let mut resting = bench.sequence.clone();
+        resting.enter(CrankRest, &bench.setup);
+        assert_eq!(resting.orders(), Orders::default(), "no fuel between two cranks");
         let running = [SafetyOn, StartIdle, WarmingUp, WaitToOnload];
         assert_eq!(seen, [&[Preheat, FuelOutput][..], &attempts, &running].concat());
         assert_eq!(bench.sequence.starts, 11);
@@ -436,6 +445,7 @@ mod tests {
         }
         assert_eq!((bench.status(), bench.sequence.seconds_left()), (StopFailure, 0));
         assert!(!bench.sequence.orders().fuel && !bench.react(Cause::StartKey));
+        assert!(bench.sequence.orders().idle, "it does not speed up");
         assert_eq!(bench.walk(Standby, |_| DEAD), [StopFailure, AfterStop, Standby]);
     }
 

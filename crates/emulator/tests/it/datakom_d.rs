@@ -3,7 +3,10 @@
 mod alarms;
 mod auto;
 mod chance;
+mod contacts;
 mod display;
+mod g59;
+mod meters;
 mod parallel;
 mod share;
 

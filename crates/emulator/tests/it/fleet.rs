@@ -214,7 +214,7 @@ fn what_is_wrong_with_a_file_is_said_with_its_line_and_a_remedy() {
         (format!("{HEAD}{GENSET}unit = 3000000000\n"), 10, "unit 0 is not possible"),
         (format!("{HEAD}{GENSET}unit = \"1\"\n"), 10, "`unit` has the wrong type"),
         (format!("{HEAD}{GENSET}model = \"D-900\"\n"), 10, "`D-900` is not a model"),
-        (format!("{HEAD}{GENSET}seed = -1\n"), 10, "`seed` has the wrong type"),
+        (format!("{HEAD}{GENSET}seed = -1\n"), 10, "`seed` is -1"),
         (format!("{HEAD}{GENSET}settings = {{ crank = 1 }}\n"), 10, "crank"),
         (format!("{HEAD}{GENSET}levers = {{ mains = \"gone\" }}\n"), 10, "`mains` cannot be `gone`"),
         (format!("{HEAD}{GENSET}levers = 3\n"), 10, "`levers` has the wrong type"),

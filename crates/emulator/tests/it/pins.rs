@@ -95,7 +95,10 @@ fn refusals_name_the_point_and_what_is_allowed() {
     assert!(matches!(problem, PinProblem::Bit { .. }));
     assert!(text.contains("`low_fuel`") && text.contains("low_fuel_level"), "{text}");
 
-    assert_eq!(refusal("no_such_point", "1").0, PinProblem::UnknownPoint);
+    assert_eq!(refusal("no_such_point", "1").0, PinProblem::UnknownPoint { nearest: None });
+    let near = |name| PinProblem::UnknownPoint { nearest: Some(String::from(name)) };
+    assert_eq!(refusal("fuel_levle", "1").0, near("fuel_level"));
+    assert_eq!(refusal("crank_tiem", "1").0, near("crank_time"), "a setting can be set too");
     assert_eq!(refusal("push_buttons", "1").0, PinProblem::WriteOnly);
     assert_eq!(refusal("fuel_level", "absent").0, PinProblem::NeverAbsent);
     assert_eq!(refusal("leds", "1,2").0, PinProblem::Codes { count: 32 });

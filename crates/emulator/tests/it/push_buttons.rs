@@ -100,6 +100,25 @@ fn a_breaker_key_opens_its_own_breaker_and_leaves_the_other_open() {
 }
 
 #[test]
+fn a_breaker_that_closed_by_itself_is_opened_by_its_key() {
+    let mut site = Site::quiet();
+    let closed = |site: &Site| (site.codes("onboard_inputs")[0], site.codes("onboard_inputs")[1]);
+    site.press(RUN);
+    site.walk_to(8);
+    site.device.pull("mains", "failed").unwrap();
+    site.walk_to(13);
+    site.press(MCB);
+    site.pass_seconds(5);
+    assert_eq!(closed(&site), (1, 0), "the key of dead mains is dead");
+    site.press(GCB);
+    assert_eq!(site.walk_to(8), [13, 8]);
+    site.pass_seconds(10);
+    assert_eq!((site.code("operation_status"), closed(&site)), (8, (0, 0)));
+    site.press(GCB);
+    assert_eq!(site.walk_to(13), [&[8][..], &TAKE_LOAD].concat());
+}
+
+#[test]
 fn a_transfer_that_is_no_longer_wanted_turns_round() {
     let mut site = Site::quiet();
     site.press(RUN);
@@ -240,10 +259,93 @@ fn a_hard_reset_stops_the_engine() {
     let resets = site.number("ethernet_resets");
     site.write(HARD_RESET, 14536);
     assert_eq!(site.device.answer(1, &Request::ReadHoldingRegisters { address: 10604, count: 1 }), None);
-    site.pass_seconds(15);
-    assert_eq!(site.code("operation_status"), 0);
+    site.pass_seconds(5);
+    assert_eq!(site.walk_to(0), [25, 0], "it rolls out");
     assert_eq!(site.number("engine_speed"), 0.0);
     assert_eq!(site.number("ethernet_resets"), resets + 1.0);
+}
+
+#[test]
+fn a_hard_reset_of_a_unit_whose_engine_cannot_be_stopped_cranks_nothing() {
+    let mut site = Site::quiet();
+    site.press(TEST);
+    site.walk_to(13);
+    site.device.pull("fuel.solenoid", "stuck").unwrap();
+    site.write(HARD_RESET, 14536);
+    site.pass_seconds(60);
+    assert_eq!(site.code("operation_status"), 25);
+    assert!(site.bits("warning_alarms").contains(99), "fail to stop");
+    site.device.pull("fuel.solenoid", "normal").unwrap();
+    assert_eq!(site.walk_to(13), [&[25][..], &START, &TAKE_LOAD].concat());
+}
+
+#[test]
+fn what_was_asked_for_by_hand_is_not_done_after_an_alarm_has_been_reset() {
+    const RESET: u16 = 1 << 14 | 1 << 10;
+    let mut site = Site::quiet();
+    site.press(RUN);
+    site.walk_to(8);
+    site.press(GCB);
+    site.walk_to(13);
+    site.device.inject("shutdown_alarms.high_oil_pressure", true).unwrap();
+    site.walk_to(0);
+    site.device.inject("shutdown_alarms.high_oil_pressure", false).unwrap();
+    site.press(RUN);
+    site.pass_seconds(5);
+    site.press(RESET);
+    site.pass_seconds(30);
+    assert_eq!((site.code("unit_mode"), site.code("operation_status")), (2, 0));
+    assert!(site.bits("shutdown_alarms").is_empty());
+    site.press(RUN);
+    assert_eq!(site.walk_to(8), START);
+    site.pass_seconds(10);
+    assert_eq!(site.code("operation_status"), 8, "off load");
+}
+
+#[test]
+fn a_mains_breaker_that_was_opened_by_hand_stays_open_whatever_trips() {
+    for alarm in ["shutdown_alarms.low_fuel_level", "load_dump_alarms.over_load"] {
+        let mut site = Site::model("D-700");
+        site.press(RUN);
+        site.press(MCB);
+        site.pass_seconds(1);
+        site.device.inject(alarm, true).unwrap();
+        for _ in 0..100 {
+            site.pass(TENTH);
+            assert_eq!(site.codes("onboard_inputs")[1], 0, "{alarm}");
+        }
+        site.press(MCB);
+        site.pass_seconds(1);
+        assert_eq!(site.codes("onboard_inputs")[1], 1, "{alarm}: it is closed by hand too");
+    }
+}
+
+#[test]
+fn manual_leaves_a_d_700_with_the_load_that_it_has() {
+    let mut site = Site::model("D-700");
+    site.press(TEST);
+    site.walk_to(13);
+    site.press(RUN);
+    site.pass_seconds(30);
+    assert_eq!((site.code("unit_mode"), site.code("operation_status")), (2, 13));
+    site.press(RUN);
+    site.press(MCB);
+    assert_eq!(site.walk_to(8), [&GIVE_BACK[..], &[8]].concat());
+    site.pass_seconds(10);
+    assert_eq!(site.code("operation_status"), 8, "it goes on running");
+}
+
+#[test]
+fn a_word_without_a_key_silences_nothing() {
+    let mut site = Site::quiet();
+    site.device.inject("warning_alarms.over_load", true).unwrap();
+    site.pass_seconds(1);
+    for word in [0, 0x4000, 0x8000, 0x3800] {
+        site.press(word);
+        assert!(site.flag(1), "{word:04X}");
+    }
+    site.press(1 << 9);
+    assert!(!site.flag(1));
 }
 
 #[test]

@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
+use busbar_profile::text::{in_words, shown};
 use busbar_profile::{Collector, Profile, WordOrder};
 
-use super::reader::{At, Limits, Table, in_words};
+use super::reader::{At, Limits, Table};
 use super::wires::Wires;
-use super::words::{listed, meant, remedy, shown};
+use super::words::{listed, meant, remedy};
 use super::{Nameplate, Poll, SiteDevice, keys, profiles, text};
 
 const POLL: RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(3600);

@@ -5,10 +5,11 @@ mod nodes;
 
 use std::collections::BTreeMap;
 
+use busbar_profile::text::shown;
 use busbar_profile::{Collector, Profile};
 
 use super::reader::{At, Table};
-use super::words::{remedy, shown};
+use super::words::remedy;
 
 /// The single-line diagram of a site; empty where the file draws none.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -1,9 +1,9 @@
 //! `hosts` of `[server]`: the names under which a proxy on the same machine asks for the gateway.
 
 use busbar_profile::Collector;
+use busbar_profile::text::shown;
 
 use super::reader::Table;
-use super::words::shown;
 
 /// The names in lower case.
 pub(super) fn read(server: &Table<'_, '_>, findings: &mut Collector<'_>) -> Vec<String> {

@@ -4,10 +4,11 @@ use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
 use busbar_profile::Collector;
+use busbar_profile::text::{duration, in_words, shown};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::words::{meant, shown};
+use super::words::meant;
 
 /// A value and where it stands in the text.
 #[derive(Debug, Clone)]
@@ -153,7 +154,7 @@ impl<'t, 'i> Table<'t, 'i> {
         let Some(text) = value.get_ref().as_str() else {
             return wrong_type(key, value, "a duration in quotes, such as \"1s\"", findings);
         };
-        let Some(duration) = parse_duration(text) else {
+        let Some(duration) = duration(text) else {
             findings.add(value.span(), format!("`{}` is no duration", shown(text)), HELP);
             return None;
         };
@@ -222,57 +223,4 @@ fn wrong_type<T>(
     let found = value.get_ref().type_str();
     findings.add(value.span(), format!("`{key}` has the wrong type ({found})"), format!("write {wanted}"));
     None
-}
-
-/// `500ms`, `1s`, `2min`, `1h`; nothing else.
-fn parse_duration(text: &str) -> Option<Duration> {
-    let digits = text.find(|c: char| !c.is_ascii_digit())?;
-    let number: u64 = text[..digits].parse().ok()?;
-    let milliseconds = match &text[digits..] {
-        "ms" => 1,
-        "s" => 1_000,
-        "min" => 60_000,
-        "h" => 3_600_000,
-        _ => return None,
-    };
-    number.checked_mul(milliseconds).map(Duration::from_millis)
-}
-
-pub(super) fn in_words(duration: Duration) -> String {
-    match duration.as_millis() {
-        0 => "0s".to_owned(),
-        ms if ms % 3_600_000 == 0 => format!("{}h", ms / 3_600_000),
-        ms if ms % 60_000 == 0 => format!("{}min", ms / 60_000),
-        ms if ms % 1_000 == 0 => format!("{}s", ms / 1_000),
-        ms => format!("{ms}ms"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn durations() {
-        for (text, expected) in [
-            ("500ms", Some(500)),
-            ("1s", Some(1_000)),
-            ("2min", Some(120_000)),
-            ("1h", Some(3_600_000)),
-            ("1", None),
-            ("s", None),
-            ("", None),
-            ("-1s", None),
-            ("1.5s", None),
-            ("1 s", None),
-            ("1d", None),
-            ("99999999999999999999s", None),
-            ("9999999999999999999h", None),
-        ] {
-            assert_eq!(parse_duration(text), expected.map(Duration::from_millis), "{text}");
-        }
-        assert_eq!(in_words(Duration::from_millis(1_500)), "1500ms");
-        assert_eq!(in_words(Duration::from_secs(60)), "1min");
-        assert_eq!(in_words(Duration::ZERO), "0s");
-    }
 }

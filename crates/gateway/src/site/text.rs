@@ -1,9 +1,9 @@
 //! Ids and names: what a text may be that addresses, findings and people call something by.
 
 use busbar_profile::Collector;
+use busbar_profile::text::{is_unseen, shown};
 
 use super::reader::{At, Table};
-use super::words::{is_unseen, shown};
 
 /// Longest name, in characters.
 const LONGEST_NAME: usize = 200;

@@ -1,10 +1,11 @@
 //! The time zone of a site: a name of the IANA database.
 
 use busbar_profile::Collector;
+use busbar_profile::text::shown;
 use jiff::tz::TimeZoneDatabase;
 
 use super::reader::Table;
-use super::words::{meant, shown};
+use super::words::meant;
 
 /// The name as the database spells it.
 ///

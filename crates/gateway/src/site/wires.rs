@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use busbar_link::Endpoint;
 use busbar_profile::Collector;
+use busbar_profile::text::shown;
 
 use super::reader::{At, Table};
-use super::words::shown;
 use super::{SiteWire, keys, text};
 
 const TIMEOUT: RangeInclusive<Duration> = Duration::from_millis(10)..=Duration::from_secs(60);

@@ -1,43 +1,13 @@
-//! Words of the file as the findings repeat them, and what may have been meant by a wrong one.
+//! What may have been meant by a wrong word of the file.
 
 use busbar_profile::nearest;
 
-/// No sentence repeats more of a text than this.
+/// Nobody meant another word by one that is longer.
 const LONGEST: usize = 60;
 /// More than this are not listed in a sentence.
 const MOST_LISTED: usize = 12;
 /// Among more than this nobody looks for what was meant: a large file with many mistakes is still read at once.
 const MOST_COMPARED: usize = 500;
-
-/// A text of the file in a sentence: short, and with nothing in it that a terminal obeys or an eye misses.
-pub(super) fn shown(text: &str) -> String {
-    let mut shown = String::new();
-    for (count, c) in text.chars().enumerate() {
-        if count == LONGEST {
-            shown.push('…');
-            break;
-        }
-        match c.is_control() || is_unseen(c) {
-            true => shown.extend(c.escape_unicode()),
-            false => shown.push(c),
-        }
-    }
-    shown
-}
-
-/// Characters that show nothing themselves and can make a text look like another one: they join, hide, or turn the
-/// direction of what follows (Unicode's format characters, its line separators, its fillers and tags).
-pub(super) fn is_unseen(c: char) -> bool {
-    matches!(
-        c,
-        '\u{AD}' | '\u{34F}' | '\u{600}'..='\u{605}' | '\u{61C}' | '\u{6DD}' | '\u{70F}' | '\u{890}'..='\u{891}'
-            | '\u{8E2}' | '\u{115F}'..='\u{1160}' | '\u{17B4}'..='\u{17B5}' | '\u{180B}'..='\u{180F}'
-            | '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{2800}' | '\u{3164}'
-            | '\u{FEFF}' | '\u{FFA0}' | '\u{FFF9}'..='\u{FFFB}' | '\u{110BD}' | '\u{110CD}'
-            | '\u{13430}'..='\u{1343F}' | '\u{1BCA0}'..='\u{1BCA3}' | '\u{1D173}'..='\u{1D17A}'
-            | '\u{E0000}'..='\u{E0FFF}'
-    )
-}
 
 /// What to write instead of a word that is none of these.
 pub(super) fn remedy<'a, I>(word: &str, known: I) -> String
@@ -85,13 +55,6 @@ pub(super) fn listed<'a>(words: impl ExactSizeIterator<Item = &'a str>) -> Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_sentence_repeats_nothing_long_or_unseen() {
-        assert_eq!(shown("gen\u{1B}[2J\u{202E}1\n"), "gen\\u{1b}[2J\\u{202e}1\\u{a}");
-        assert_eq!(shown(&"é".repeat(60)), "é".repeat(60));
-        assert_eq!(shown(&"é".repeat(61)), format!("{}…", "é".repeat(60)));
-    }
 
     #[test]
     fn what_was_meant() {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use busbar_emulator::{Emulation, Fleet, start_fleet};
+use busbar_emulator::{Emulation, Faults, Fleet, start_fleet};
 use busbar_link::Endpoint;
 use serde::Serialize;
 
@@ -56,10 +56,16 @@ struct Bound<'a> {
     control: Option<String>,
 }
 
-pub(super) fn run(file: &Path, args: &args::Emulate, json: bool) -> Result<(), Failure> {
+pub(super) fn run(
+    file: &Path,
+    args: &args::Emulate,
+    faults: Option<&Faults>,
+    json: bool,
+) -> Result<(), Failure> {
     let mut fleet = read(file, "fleet file", Fleet::parse)?;
     for member in &mut fleet.members {
         member.config.speed = args.speed;
+        member.config.faults = faults.cloned();
         match args.seed {
             // By itself each is another machine.
             Some(seed) => member.config.seed = member.config.seed.wrapping_add(seed),
@@ -67,6 +73,9 @@ pub(super) fn run(file: &Path, args: &args::Emulate, json: bool) -> Result<(), F
         }
     }
     let token = control::token()?;
+    if let Some(address) = args.control {
+        control::allow(address, token.as_ref())?;
+    }
     runtime::service(async |mut stop| {
         let emulation = start_fleet(fleet.clone()).await.map_err(failure)?;
         let control = match args.control {

@@ -5,7 +5,7 @@ mod scenario;
 
 use std::path::Path;
 
-use busbar_emulator::{Config, Scenario, StartError};
+use busbar_emulator::{Config, Faults, Scenario, StartError};
 use busbar_link::Endpoint;
 use busbar_profile::{DateTime, Findings};
 use jiff::Zoned;
@@ -26,8 +26,10 @@ struct Bound<'a> {
 
 pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
     logging::start("warn", logging::Format::Text)?;
+    let faults = args.faults.as_deref();
+    let faults = faults.map(|file| read(file, "file of faults", Faults::parse)).transpose()?;
     if let Some(file) = &args.fleet {
-        return fleet::run(file, &args, json);
+        return fleet::run(file, &args, faults.as_ref(), json);
     }
     // One of the two is there: the command line saw to it.
     let key = args.key.unwrap_or_default();
@@ -45,10 +47,14 @@ pub(crate) fn run(args: args::Emulate, json: bool) -> Result<(), Failure> {
         // Who names a seed, or plays a scenario, wants the same registers every time, the calendar's too.
         epoch: if args.seed.is_some() || is_played { usual.epoch } else { today() },
         speed: args.speed,
+        faults,
         pins: usual.pins.into_iter().chain(args.set).collect(),
         ..usual
     };
     let token = control::token()?;
+    if let Some(address) = args.control {
+        control::allow(address, token.as_ref())?;
+    }
     runtime::service(async |mut stop| {
         let emulation = busbar_emulator::start(config).await.map_err(failure)?;
         let control = match args.control {

@@ -206,6 +206,63 @@ fn an_engine_that_dies_while_it_warms_up_is_cranked_again() {
 }
 
 #[test]
+fn the_starter_meets_no_engine_that_turns() {
+    let mut sequence = sequence(&Settings::usual());
+    let (dead, rolling) = (Sensed::default(), Sensed { turning: true, ..Sensed::default() });
+    // After a hard reset, or with a fuel valve that does not close.
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, rolling), Stopping);
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, dead), AtRest);
+    while sequence.operation() != CrankRest {
+        until_change(&mut sequence, Demand::ON_LOAD, dead);
+    }
+    for _ in 0..1000 {
+        sequence.step(TENTH, Demand::ON_LOAD, rolling);
+        assert_eq!(sequence.operation(), CrankRest, "it rolls");
+    }
+    let fired = Sensed { running: true, ..rolling };
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, fired), IdleSpeed, "it needs no starter");
+}
+
+#[test]
+fn a_genset_that_has_left_its_limits_takes_no_load() {
+    let mut sequence = sequence(&Settings::usual());
+    sequence.enter(GensetBreakerTimer);
+    let turning = Sensed { running: true, turning: true, mains_healthy: false, ..Sensed::default() };
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, turning), OffLoad);
+    let good = Sensed { genset_healthy: true, ..turning };
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, good), GensetBreakerTimer);
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, good), GensetBreakerActivation);
+}
+
+#[test]
+fn an_engine_that_stands_carries_nothing_whatever_its_protections_say() {
+    let mut sequence = sequence(&Settings::usual());
+    sequence.enter(OnLoad);
+    let loaded = Sensed { genset_breaker: true, ..Sensed::default() };
+    sequence.step(TENTH, Demand::ON_LOAD, loaded);
+    assert!(!sequence.controls(Demand::ON_LOAD, loaded).genset_breaker);
+    let dead = Sensed::default();
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, dead), OffLoad);
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, dead), Stopping);
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, dead), AtRest, "and is started anew");
+    assert_eq!(until_change(&mut sequence, Demand::ON_LOAD, dead), WaitBeforeFuel);
+}
+
+#[test]
+fn a_load_that_cannot_be_moved_whole_moves_when_the_timer_ends() {
+    let mut site = Site::new(&soft());
+    site.sensed.mains_unloaded = false;
+    let mut site = site.pass(Demand::ON_LOAD, 30);
+    assert_eq!(site.sequence.operation(), TransferToGenset);
+    assert!(!site.sequence.timer().is_zero());
+    site = site.pass(Demand::ON_LOAD, 60);
+    assert_eq!(site.sequence.operation(), OnLoad);
+    site.sensed.genset_unloaded = false;
+    let site = site.pass(Demand::REST, 90);
+    assert_eq!(site.seen, [&START[..], &[9, 11, 10, 13, 17, 18, 21, 22]].concat());
+}
+
+#[test]
 fn the_timer_counts_down_to_the_change() {
     let mut sequence = sequence(&Settings::usual());
     sequence.step(TENTH, Demand::OFF_LOAD, Sensed::default());
@@ -361,12 +418,12 @@ mod chance {
                 sequence.trip(if chance(0.7) { Trip::LoadDump } else { Trip::Shutdown });
                 demand = Demand::REST;
             }
-            if sequence.operation() == Cranking {
+            if matches!(sequence.operation(), Cranking | CrankRest) {
                 sensed.running |= chance(0.05);
             } else if !sequence.may_turn() || chance(0.004) {
                 sensed.running = false;
             }
-            sensed.turning = sensed.running;
+            sensed.turning = sensed.running || chance(0.01);
             sequence.step(TENTH, demand, sensed);
             let now = sequence.operation();
             if now != before {

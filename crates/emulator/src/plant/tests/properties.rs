@@ -82,6 +82,7 @@ fn outputs(bits: u8) -> Controls {
         fuel_pump: on(4),
         genset_breaker: on(5),
         mains_breaker: on(6),
+        load_shedding: on(7),
     }
 }
 
@@ -274,8 +275,14 @@ fn happen_to_air(plant: &mut Compressor, orders: &mut Orders, what: &Happening) 
         }
         Happening::Outputs(bits) => {
             let on = |bit: u8| bits >> bit & 1 == 1;
-            *orders =
-                Orders { fuel: on(0), starter: on(1), idle: on(2), load_valve: on(5), blow_down: on(4) };
+            *orders = Orders {
+                fuel: on(0),
+                starter: on(1),
+                idle: on(2),
+                heater: on(3),
+                blow_down: on(4),
+                load_valve: on(5),
+            };
         }
         Happening::Trim(_) => {}
     }
@@ -304,7 +311,7 @@ fn compressor_step_is_lawful(plant: &mut Compressor, orders: &Orders) -> Result<
         ("separator", plant.air.separator_loss, 0.0..400.0),
         ("delivery", plant.air.delivery, 0.0..16.0),
         ("consumption", plant.air.consumption, 0.0..14.001),
-        ("exhaust", plant.exhaust.temperature, -30.0..1150.0),
+        ("exhaust", plant.exhaust.temperature, -30.0..690.0),
         ("boost", plant.exhaust.boost, 0.0..350.0),
         ("soot", plant.filter.soot, 0.0..150.001),
         ("torque", plant.torque(), 0.0..125.001),

@@ -95,7 +95,7 @@ fn plausible(point: &Point) -> RangeInclusive<f64> {
         ("ash_percentage", _) => 3.0..=30.0,
         ("battery_voltage", _) => 18.0..=29.0,
         ("charger_voltage", _) => 0.0..=29.0,
-        ("sensor_1_resistance", _) => 0.0..=0.0,
+        ("sensor_1_resistance", _) => 6553.5..=6553.5,
         (_, Some("ohm")) => 10.0..=200.0,
         ("sensor_5_current", _) => 4.0..=20.0,
         ("total_running_hours", _) => 900.0..=2700.0,
@@ -210,7 +210,7 @@ fn states_agree(site: &Site, place: &str) {
         _ => {}
     }
     let outputs = site.bits("outputs");
-    assert_eq!(outputs.contains(0), (2..=11).contains(&status), "{place}: fuel");
+    assert_eq!(outputs.contains(0), matches!(status, 2 | 3 | 5..=11), "{place}: fuel");
     assert_eq!(outputs.contains(1), status == 3, "{place}: crank");
     assert_eq!(indicator(site, 6), status == 9, "{place}: load indicator");
     assert_eq!(indicator(site, 8), status == 8, "{place}: idle running");
@@ -340,7 +340,15 @@ fn maintenance_words_follow_their_countdowns() {
 }
 
 #[test]
-fn common_bits_follow_pinned_words() {
+fn the_engines_fault_and_common_bits_follow_pinned_words() {
+    for (word, bit, fault) in [
+        ("warning_alarms_1", "ecu_warning", true),
+        ("shutdown_alarms_1", "ecu_shutdown", true),
+        ("warning_alarms_1", "ncd_error", false),
+    ] {
+        let site = pinned(&[(word, bit)]);
+        assert_eq!(site.bits("engine_indicators").contains(9), fault, "{bit}");
+    }
     let site = pinned(&[("shutdown_alarms_4", "high_discharge_pressure_shutdown")]);
     assert_eq!([0, 1, 2].map(|bit| common(&site, bit)), [true, true, false]);
     let site = pinned(&[("indications_1", "0")]);

@@ -116,6 +116,18 @@ fn overload_protection_unloads_for_a_while_and_loads_again() {
     press(&mut site, STOP);
     site.pass_seconds(15);
     assert!(!protected(&site));
+
+    let mut site = set(&[("overload_limit", "10"), ("overload_rest_time", "3600")]);
+    press(&mut site, START);
+    walk_to(&mut site, 8);
+    site.pass_seconds(20);
+    assert!(!protected(&site), "there is nothing to take from it");
+    press(&mut site, LOAD_UNLOAD);
+    site.pass_seconds(20);
+    assert!(protected(&site));
+    press(&mut site, STOP);
+    walk_to(&mut site, 0);
+    assert!(!protected(&site), "nor from one that stands");
 }
 
 #[test]
@@ -209,4 +221,32 @@ fn manual_heating_is_for_a_unit_at_rest_and_ends_by_itself() {
     pull(&mut site, "heating", "on");
     site.pass_seconds(1);
     assert!(!heats(&site), "the menu does not offer it to a unit that starts");
+
+    let mut site = quiet();
+    for end in ["stop", "emergency_stop"] {
+        pull(&mut site, "heating", "on");
+        site.pass_seconds(5);
+        assert!(heats(&site));
+        match end {
+            "stop" => press(&mut site, STOP),
+            _ => pull(&mut site, end, "pressed"),
+        }
+        site.pass(TENTH);
+        assert!(!heats(&site), "{end}");
+    }
+    pull(&mut site, "heating", "on");
+    site.pass(TENTH);
+    assert!(!heats(&site), "not while a shutdown stands");
+}
+
+#[test]
+fn manual_heating_warms_the_engine() {
+    let warmed = |heating: &str| {
+        let mut site = set(&[("heating_time", "3600")]);
+        pull(&mut site, "ambient", "-20");
+        pull(&mut site, "heating", heating);
+        site.pass_seconds(1800);
+        site.number("engine_temperature")
+    };
+    assert!(warmed("on") > warmed("off") + 12.0);
 }

@@ -101,11 +101,15 @@ proptest! {
         let with_break = settings.is_empty();
         let mut site = set(&settings);
         let mut counters = [0.0; 3];
+        let mut before = (site.flag(2), site.number("engine_speed"));
         for (event, tenths) in &script {
             happen(&mut site, event);
             for _ in 0..*tenths {
                 site.pass(crate::site::TENTH);
                 obeys(&site)?;
+                let now = (site.flag(2), site.number("engine_speed"));
+                prop_assert!(before.0 || !now.0 || before.1 == 0.0, "cranked at {} rpm", before.1);
+                before = now;
                 // With a break the two meet only where a breaker is stuck or somebody wants them side by side.
                 let stuck = ["breaker.genset", "breaker.mains"].map(|lever| site.device.lever(lever));
                 if with_break && stuck.iter().all(|lever| *lever == Some(Position::Word("normal"))) {
@@ -118,6 +122,44 @@ proptest! {
             counters = now;
         }
         prop_assert_eq!(site.device.misfits(), 0);
+    }
+
+    #[test]
+    fn a_site_that_is_put_right_comes_home(
+        settings in select(vec![
+            vec![],
+            vec![("no_break_transfer", "1"), ("soft_transfer", "1")],
+            vec![("peak_lopping", "1"), ("peak_lopping_power", "60"), ("power_export", "1"), ("slave_unit", "1")],
+        ]),
+        script in prop::collection::vec((event(), 1..120_u64), 1..40),
+    ) {
+        let mut site = set(&settings);
+        for (event, tenths) in &script {
+            happen(&mut site, event);
+            site.pass(crate::site::TENTH * u32::try_from(*tenths).unwrap());
+        }
+        let alarms: Vec<_> = site.device.alarms().map(|alarm| format!("{}.{}", alarm.point, alarm.id)).collect();
+        for alarm in alarms {
+            site.device.inject(&alarm, false).unwrap();
+        }
+        for lever in site.device.levers() {
+            let healthy = lever.words.first().map_or("80", |word| word.id);
+            site.device.pull(lever.id, healthy).unwrap();
+        }
+        // What overheated has to cool before its alarm can be reset.
+        site.press(crate::site::STOP);
+        site.pass_seconds(600);
+        site.press(crate::site::STOP);
+        site.press(crate::site::AUTO);
+        site.pass_seconds(5);
+        prop_assert_eq!(site.code("operation_status"), 0);
+        prop_assert!(site.bits(SHUTDOWN).is_empty() && site.bits(LOAD_DUMP).is_empty());
+        prop_assert_eq!(closed(&site), (false, true));
+        prop_assert!(super::load(&site) > 20.0);
+        super::pull(&mut site, "mains", "failed");
+        site.pass_seconds(90);
+        prop_assert_eq!(closed(&site), (true, false));
+        prop_assert!(super::load(&site) > 20.0);
     }
 
     #[test]

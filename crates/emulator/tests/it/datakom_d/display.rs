@@ -165,6 +165,21 @@ fn the_scope_page_draws_the_trace_of_the_channel() {
 }
 
 #[test]
+fn the_synchroscope_needs_two_sources() {
+    let mut site = set(&[("no_break_transfer", "1"), ("synchronizing_time", "600")]);
+    for _ in 0..4 {
+        site.press(NEXT);
+    }
+    let needle = |site: &Site| (5..124).filter(|x| pixels(site)[52][*x]).map(|x| x as f64).sum::<f64>() / 3.0;
+    assert_eq!(needle(&site), 0.0, "the genset stands");
+    site.press(TEST);
+    site.walk_to(9);
+    assert!(needle(&site) > 4.0);
+    site.walk_to(11);
+    assert!((needle(&site) - 64.0).abs() < 5.0, "in step it stands in the middle: {}", needle(&site));
+}
+
+#[test]
 fn the_mimic_shows_the_breakers() {
     let mut site = Site::quiet();
     site.press(DOWN);

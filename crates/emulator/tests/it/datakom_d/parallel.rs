@@ -111,6 +111,30 @@ fn a_genset_that_cannot_be_led_transfers_with_a_break_and_says_so() {
 }
 
 #[test]
+fn a_load_that_the_genset_cannot_take_whole_is_left_with_the_rest_when_the_timer_ends() {
+    let unlimited = [("overload_load_dump", "1000"), ("over_current_load_dump", "1000")];
+    let mut site = set(&[&[("no_break_transfer", "1"), ("soft_transfer", "1")][..], &unlimited].concat());
+    pull(&mut site, "load", "95");
+    site.press(TEST);
+    site.walk_to(10);
+    assert_eq!(site.number("operation_timer"), 60.0);
+    site.walk_to(13);
+    assert!(site.number("genset_active_power") > 90.0);
+}
+
+#[test]
+fn a_genset_does_not_meet_mains_whose_phases_have_changed_places() {
+    let mut site = set(&[("no_break_transfer", "1"), ("mains_fail_delay", "600")]);
+    pull(&mut site, "remote_start", "on");
+    site.walk_to(9);
+    pull(&mut site, "mains", "reversed");
+    for _ in 0..550 {
+        site.pass(TENTH);
+        assert_eq!((site.code("operation_status"), closed(&site)), (9, (false, true)));
+    }
+}
+
+#[test]
 fn mains_that_fail_during_a_transfer_leave_the_load_to_the_genset() {
     for status in [10, 17, 18] {
         let mut site = set(&[("no_break_transfer", "1"), ("soft_transfer", "1")]);

@@ -82,6 +82,7 @@ const CAUSES: &[Cause] = &[
     cause("shutdown_alarms_2.fail_to_start", &[], (TEST, 1), &[("ignition", "never")], 120),
     cause("shutdown_alarms_2.genset_low_voltage", &[], WARMING, &[("avr", "failed")], 60),
     cause("shutdown_alarms_2.genset_high_voltage", &[], WARMING, &[("avr", "high")], 60),
+    cause("shutdown_alarms_2.genset_phase_sequence_fail", &[], WARMING, &[("genset.wiring", "swapped")], 10),
     cause(
         "shutdown_alarms_2.genset_low_rpm",
         &[("rpm_from_genset_frequency", "0")],
@@ -89,7 +90,13 @@ const CAUSES: &[Cause] = &[
         &[("pickup", "broken")],
         10,
     ),
-    cause("shutdown_alarms_2.genset_high_rpm", &[], WARMING, &[("governor", "runaway")], 60),
+    cause(
+        "shutdown_alarms_2.genset_high_rpm",
+        &[("high_frequency_shutdown_limit", "0")],
+        WARMING,
+        &[("governor", "runaway")],
+        60,
+    ),
     cause("shutdown_alarms_2.j1939_ecu_communication_fail", &[], WARMING, &[("ecu", "cut")], 10),
     cause("shutdown_alarms_2.communication_lost", &[("multi_genset", "1")], AT_REST, &[], 10),
     cause("load_dump_alarms.genset_reverse_power", PEAK, (AUTO, 15), &[("fuel.supply", "shut")], 60),
@@ -97,14 +104,15 @@ const CAUSES: &[Cause] = &[
         "load_dump_alarms.genset_excess_power",
         &[],
         LOADED,
-        &[("load", "95"), ("load.power_factor", "1")],
+        // More than shedding takes off.
+        &[("load", "120"), ("load.power_factor", "1")],
         30,
     ),
     cause(
         "load_dump_alarms.alternator_overcurrent",
         &[],
         LOADED,
-        &[("load", "80"), ("load.power_factor", "0.6")],
+        &[("load", "85"), ("load.power_factor", "0.5")],
         30,
     ),
     cause("warning_alarms_1.j1939_ecu_warning", &[], AT_REST, &[("tank", "15")], 5),
@@ -223,7 +231,6 @@ const INJECTED_ONLY: &[&str] = &[
     "shutdown_alarms_1.input_6",
     "shutdown_alarms_1.input_7",
     "shutdown_alarms_2.slave_unavailable",
-    "shutdown_alarms_2.genset_phase_sequence_fail",
     "load_dump_alarms.input_0",
     "load_dump_alarms.input_1",
     "load_dump_alarms.input_2",
@@ -441,4 +448,62 @@ fn the_horn_sounds_for_its_timer_from_every_new_alarm_on() {
     site.write(MODE_KEYS, AUTO);
     site.pass(TENTH);
     assert!(!horn(&site), "a key silences it");
+}
+
+#[test]
+fn no_time_is_no_fault_where_there_is_no_cause() {
+    let mut site = set(&[("ecu_silence_time", "0"), ("control_fail_time", "0")]);
+    site.pass_seconds(5);
+    site.write(MODE_KEYS, TEST);
+    site.walk_to(4);
+    site.pass_seconds(30);
+    for word in ["shutdown_alarms_2", "warning_alarms_3"] {
+        assert!(site.bits(word).is_empty(), "{word}");
+    }
+    pull(&mut site, &[("ecu", "cut")]);
+    site.pass(2 * TENTH);
+    assert!(is_on(&site, "shutdown_alarms_2.j1939_ecu_communication_fail"));
+}
+
+#[test]
+fn an_engine_that_runs_away_or_loses_its_oil_is_stopped_while_it_heats() {
+    for (lever, to, alarm, seconds) in [
+        ("governor", "runaway", "shutdown_alarms_1.genset_over_frequency", 12),
+        ("oil", "leaking", "shutdown_alarms_1.low_oil_pressure", 110),
+        ("fuel.supply", "shut", "shutdown_alarms_1.genset_under_frequency", 20),
+    ] {
+        let mut site = set(&[("engine_heating_timer", "200")]);
+        site.write(MODE_KEYS, TEST);
+        site.walk_to(4);
+        pull(&mut site, &[(lever, to)]);
+        assert!(within(&mut site, seconds, |site| is_on(site, alarm)), "{lever}");
+        assert!(site.number("engine_speed") < 1950.0);
+        assert_eq!(site.walk_to(0), [13, 0], "{lever}");
+    }
+}
+
+#[test]
+fn the_holdoff_counts_from_idle_speed_on() {
+    for (holdoff, idle, seconds) in [("10", "0", 13), ("2", "9", 14), ("0", "0", 3)] {
+        let mut site = set(&[("holdoff_time", holdoff), ("idle_timer", idle), ("low_rpm_shutdown", "1700")]);
+        site.write(MODE_KEYS, TEST);
+        site.walk_to(4);
+        site.pass_seconds(seconds - 1);
+        assert!(!is_on(&site, "shutdown_alarms_2.genset_low_rpm"), "too early at {holdoff} and {idle}");
+        site.pass(15 * TENTH);
+        assert!(is_on(&site, "shutdown_alarms_2.genset_low_rpm"), "{holdoff} and {idle}");
+    }
+}
+
+#[test]
+fn a_genset_of_the_wrong_order_is_stopped_unless_nobody_looks() {
+    for (ignore, wrong) in [("0", true), ("1", false)] {
+        let mut site = set(&[("ignore_phase_order", ignore)]);
+        pull(&mut site, &[("genset.wiring", "swapped")]);
+        site.write(MODE_KEYS, LOAD_TEST);
+        site.walk_to(if wrong { 13 } else { 8 });
+        assert_eq!(is_on(&site, "shutdown_alarms_2.genset_phase_sequence_fail"), wrong);
+        assert!(!wrong || site.bits("genset_phase_order").contains(7));
+        assert!(!site.bits("mains_phase_order").contains(7));
+    }
 }

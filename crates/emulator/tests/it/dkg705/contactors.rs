@@ -157,3 +157,64 @@ fn off_takes_nothing_from_good_mains() {
         assert_eq!((site.code("operation_status"), relays(&site)), (0, (false, true)));
     }
 }
+
+#[test]
+fn a_contactor_closed_out_of_step_is_a_fault_and_not_tried_again() {
+    let mut site = Site::new(&busbar_emulator::Config {
+        pins: vec![("ignore_phase_order".into(), "1".into())],
+        ..config()
+    });
+    site.device.pull("mains", "reversed").unwrap();
+    site.write(MODE_KEYS, LOAD_TEST);
+    assert_eq!(site.walk_to(8), [0, 1, 2, 3, 4, 5, 6, 7, 8]);
+    assert!(site.bits("warning_alarms_2").contains(8));
+    site.pass_seconds(60);
+    assert_eq!((site.code("operation_status"), relays(&site)), (8, (true, false)));
+    assert!(site.bits("warning_alarms_2").contains(8) && power(&site).0 > 20.0);
+    // A key lets it try again: the site has been put right.
+    site.device.pull("mains", "normal").unwrap();
+    site.write(MODE_KEYS, AUTO);
+    assert_eq!(site.walk_to(12), [8, 9, 10, 14, 12]);
+    assert!(!site.bits("warning_alarms_2").contains(8));
+}
+
+#[test]
+fn a_genset_does_not_go_on_feeding_a_dead_line() {
+    let mut site = Site::new(&busbar_emulator::Config {
+        pins: vec![("soft_transfer_ramp".into(), "1".into())],
+        ..config()
+    });
+    site.write(MODE_KEYS, LOAD_TEST);
+    site.walk_to(15);
+    site.device.pull("breaker.mains", "will_not_open").unwrap();
+    site.pass_seconds(3);
+    site.device.pull("mains", "failed").unwrap();
+    site.pass_seconds(5);
+    assert_eq!(relays(&site), (false, false), "whatever the status, {}", site.code("operation_status"));
+    assert_eq!(power(&site).0, 0.0);
+    // The line comes back: nothing is there to meet it.
+    site.device.pull("mains", "normal").unwrap();
+    for _ in 0..100 {
+        site.pass(TENTH);
+        assert!(site.number("genset_l1_current") == 0.0);
+    }
+    assert!(power(&site).1 > 20.0);
+}
+
+#[test]
+fn a_mains_contactor_that_refuses_does_not_keep_a_load_test_from_starting() {
+    let mut site = quiet();
+    site.device.pull("mains", "failed").unwrap();
+    site.pass_seconds(3);
+    site.device.pull("breaker.mains", "will_not_close").unwrap();
+    site.device.pull("mains", "normal").unwrap();
+    site.walk_to(11);
+    site.pass_seconds(30);
+    assert_eq!(site.code("operation_status"), 11, "it waits");
+    site.write(MODE_KEYS, LOAD_TEST);
+    assert_eq!(site.walk_to(8), [11, 0, 1, 2, 3, 4, 7, 8]);
+    site.write(MODE_KEYS, OFF);
+    site.device.pull("breaker.mains", "normal").unwrap();
+    site.walk_to(13);
+    assert!(power(&site).1 > 20.0);
+}

@@ -382,16 +382,41 @@ fn peak_lopping_lets_the_mains_keep_their_part() {
 }
 
 #[test]
+fn peak_lopping_asks_no_more_of_the_genset_than_it_has() {
+    let mut site = set(&[("peak_lopping", "1"), ("peak_lopping_mains", "0"), ("load_shedding_high", "0")]);
+    site.device.pull("load", "110").unwrap();
+    site.walk_to(15);
+    site.pass_seconds(60);
+    assert_eq!(site.code("operation_status"), 15);
+    assert!(
+        (site.number("genset_active_power") - 80.0).abs() < 3.0,
+        "{}",
+        site.number("genset_active_power")
+    );
+}
+
+#[test]
 fn loads_are_shed_between_their_limits() {
     let mut site = quiet();
     let sheds = |site: &Site| site.bits("relay_functions_1").contains(8);
     site.write(MODE_KEYS, LOAD_TEST);
     site.walk_to(8);
-    for (load, expected) in [("60", false), ("75", true), ("60", true), ("50", false)] {
+    for (load, expected, carried) in
+        [("60", false, 60.0), ("75", true, 60.0), ("70", true, 56.0), ("65", false, 65.0)]
+    {
         site.device.pull("load", load).unwrap();
         site.pass_seconds(3);
         assert_eq!(sheds(&site), expected, "{load} kW");
+        assert!((site.number("genset_active_power") - carried).abs() < 1.0, "a fifth of {load} kW is spared");
     }
+    // It would be too much, but for what is shed.
+    site.device.pull("load", "100").unwrap();
+    site.pass_seconds(30);
+    assert!(sheds(&site) && site.bits("load_dump_alarms").is_empty());
+    site.write(MODE_KEYS, AUTO);
+    site.walk_to(12);
+    site.pass_seconds(2);
+    assert!(!sheds(&site) && site.number("mains_active_power") > 98.0, "the mains carry all of it");
 }
 
 #[test]

@@ -3,10 +3,11 @@
 use std::collections::{HashMap, HashSet};
 
 use busbar_profile::Collector;
+use busbar_profile::text::shown;
 use busbar_profile::vocabulary::vocabulary;
 
 use super::super::reader::{At, Table};
-use super::super::words::{listed, meant, remedy, shown};
+use super::super::words::{listed, meant, remedy};
 use super::super::{keys, profiles};
 use super::nodes::Nodes;
 use super::{Connection, Defined, Named};

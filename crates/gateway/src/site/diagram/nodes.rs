@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use busbar_profile::Collector;
+use busbar_profile::text::shown;
 
 use super::super::reader::Table;
-use super::super::words::{listed, remedy, shown};
+use super::super::words::{listed, remedy};
 use super::super::{keys, profiles, text};
 use super::{Defined, Named, Node, NodeKind};
 
