@@ -1,28 +1,16 @@
 // The page in a real browser, on the real program: a site of four imitated controllers, one polled over a real socket,
 // three over one pseudo-terminal.
-import { mkdir } from 'node:fs/promises'
-import { fileURLToPath } from 'node:url'
-import { chromium, type Browser, type Page } from 'playwright-core'
+import { type Browser, type Page } from 'playwright-core'
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest'
+import { DESK, DOCS, PHONE, SHOTS, hear, hearStrangers, launch } from './browser'
 import { Demo } from './busbar'
-
-const SHOTS = fileURLToPath(new URL('shots/', import.meta.url))
-const DOCS = fileURLToPath(new URL('../../docs/', import.meta.url))
-
-const DESK = { width: 1280, height: 900 }
-const PHONE = { width: 360, height: 740 }
 
 let browser: Browser
 let demo: Demo
 let complaints: string[] = []
 
 beforeAll(async () => {
-  await mkdir(SHOTS, { recursive: true })
-  browser = await chromium.launch({
-    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-    // Root has no sandbox; nothing but the page under test is opened.
-    args: ['--no-sandbox'],
-  })
+  browser = await launch()
   demo = await Demo.start()
 })
 
@@ -38,11 +26,7 @@ afterEach(() => {
 /** Opens the page; whatever the browser complains about from here on is kept. */
 async function open(hash = '', viewport = DESK, colorScheme: 'light' | 'dark' = 'light'): Promise<Page> {
   const page = await browser.newPage({ viewport, colorScheme })
-  page.on('console', (message) => {
-    if (message.type() === 'error' || message.type() === 'warning')
-      complaints.push(`console: ${message.text()}`)
-  })
-  page.on('pageerror', (error) => complaints.push(`error: ${error.message}`))
+  hear(page, complaints)
   page.on('requestfailed', (request) => {
     // A stream or request that the page itself ends, because nobody looks any more, is none that failed.
     if (request.failure()?.errorText !== 'net::ERR_ABORTED') complaints.push(`failed: ${request.url()}`)
@@ -50,10 +34,7 @@ async function open(hash = '', viewport = DESK, colorScheme: 'light' | 'dark' = 
   page.on('response', (answer) => {
     if (answer.status() >= 400) complaints.push(`${answer.status()}: ${answer.url()}`)
   })
-  page.on('request', (request) => {
-    if (!request.url().startsWith(demo.address))
-      complaints.push(`a request to somebody else: ${request.url()}`)
-  })
+  hearStrangers(page, demo.address, complaints)
   await page.goto(demo.address + hash)
   return page
 }

@@ -1,12 +1,10 @@
 // What only those see who look, in a real browser on the real program: a controller's own screen, and the diagram.
-import { mkdir } from 'node:fs/promises'
-import { fileURLToPath } from 'node:url'
-import { chromium, type Browser, type Page } from 'playwright-core'
+import { type Browser, type Page } from 'playwright-core'
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest'
+import { SHOTS, hear, launch } from './browser'
 import { pictureOf } from '../src/screen/lcd'
 import { Demo } from './busbar'
 
-const SHOTS = fileURLToPath(new URL('shots/', import.meta.url))
 type Look = readonly [name: string, viewport: { width: number; height: number }, scheme: 'light' | 'dark']
 const LOOKS: readonly Look[] = [
   ['desk', { width: 1280, height: 900 }, 'light'],
@@ -27,12 +25,7 @@ let demo: Demo
 let complaints: string[] = []
 
 beforeAll(async () => {
-  await mkdir(SHOTS, { recursive: true })
-  browser = await chromium.launch({
-    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-    // Root has no sandbox; nothing but the page under test is opened.
-    args: ['--no-sandbox'],
-  })
+  browser = await launch()
   demo = await Demo.start()
 })
 
@@ -47,11 +40,7 @@ afterEach(() => {
 
 async function open(hash: string, [, viewport, colorScheme]: Look): Promise<Page> {
   const page = await browser.newPage({ viewport, colorScheme })
-  page.on('console', (message) => {
-    if (message.type() === 'error' || message.type() === 'warning')
-      complaints.push(`console: ${message.text()}`)
-  })
-  page.on('pageerror', (error) => complaints.push(`error: ${error.message}`))
+  hear(page, complaints)
   await page.goto(demo.address + hash)
   return page
 }

@@ -1,12 +1,10 @@
 // The page on a slow line, 85 kbit/s with 600 ms each way and back: what is there before any script, what the first
 // view weighs, and when values stand on the screen. `npm run e2e:slow` judges the times, three times over.
-import { mkdir } from 'node:fs/promises'
-import { fileURLToPath } from 'node:url'
-import { chromium, type Browser, type CDPSession, type Page } from 'playwright-core'
+import { type Browser, type CDPSession, type Page } from 'playwright-core'
 import { afterAll, beforeAll, expect, test, vi } from 'vitest'
+import { SHOTS, launch } from './browser'
 import { Demo } from './busbar'
 
-const SHOTS = fileURLToPath(new URL('shots/', import.meta.url))
 const BYTES_A_SECOND = 85_000 / 8
 const LATENCY_MS = 600
 /** What is promised. */
@@ -20,12 +18,7 @@ let browser: Browser
 let demo: Demo
 
 beforeAll(async () => {
-  await mkdir(SHOTS, { recursive: true })
-  browser = await chromium.launch({
-    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-    // Root has no sandbox; nothing but the page under test is opened.
-    args: ['--no-sandbox'],
-  })
+  browser = await launch()
   demo = await Demo.start()
   // Until every controller was read once, there is little to show.
   await vi.waitFor(

@@ -1,7 +1,8 @@
 // The page tells the truth, looked at each second: while a wire is cut and comes back, while the gateway is gone, stands
 // still or is started again, and when another controller answers than the site file says.
-import { chromium, type Browser, type Page } from 'playwright-core'
+import { type Browser, type Page } from 'playwright-core'
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest'
+import { launch } from './browser'
 import { Controller, Demo, Gateway } from './busbar'
 import { Proxy } from './proxy'
 
@@ -17,11 +18,7 @@ let page: Page
 let stops: (() => Promise<void>)[] = []
 
 beforeAll(async () => {
-  browser = await chromium.launch({
-    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-    // Root has no sandbox; nothing but the page under test is opened.
-    args: ['--no-sandbox'],
-  })
+  browser = await launch()
 })
 
 afterAll(() => browser?.close())

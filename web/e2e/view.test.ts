@@ -1,16 +1,12 @@
 // What a person does with overview and controller page, in a real browser: on the demonstration, and on sites that are
 // larger, stranger or worse than it is.
-import { mkdir } from 'node:fs/promises'
-import { fileURLToPath } from 'node:url'
-import { chromium, type Browser, type Page } from 'playwright-core'
+import { type Browser, type Page } from 'playwright-core'
 import { afterAll, afterEach, beforeAll, expect, test } from 'vitest'
+import { DESK, PHONE, SHOTS, hear, launch } from './browser'
 import { alarm, device, group, point, snapshot, stamp, value } from '../src/logic/samples'
 import { Demo } from './busbar'
 import { Imitated } from './imitated'
 
-const SHOTS = fileURLToPath(new URL('shots/', import.meta.url))
-const DESK = { width: 1280, height: 900 }
-const PHONE = { width: 360, height: 740 }
 const GENSET = '#/devices/genset-1'
 /** Three units share a line at 9600 baud: what is read less often comes each 20 s. */
 const LINE_MS = 25_000
@@ -20,12 +16,7 @@ let demo: Demo
 let complaints: string[] = []
 
 beforeAll(async () => {
-  await mkdir(SHOTS, { recursive: true })
-  browser = await chromium.launch({
-    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-    // Root has no sandbox; nothing but the page under test is opened.
-    args: ['--no-sandbox'],
-  })
+  browser = await launch()
   demo = await Demo.start()
 })
 
@@ -45,10 +36,7 @@ type Look = NonNullable<Parameters<Browser['newContext']>[0]>
 async function open(address: string, look: Look = {}): Promise<Page> {
   const context = await browser.newContext({ viewport: DESK, colorScheme: 'light', ...look })
   const page = await context.newPage()
-  page.on('pageerror', (error) => complaints.push(`error: ${error.message}`))
-  page.on('console', (message) => {
-    if (message.type() === 'error') complaints.push(`console: ${message.text()}`)
-  })
+  hear(page, complaints)
   await page.goto(address)
   return page
 }

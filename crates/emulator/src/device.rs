@@ -10,6 +10,7 @@ use crate::config::Config;
 use crate::datakom_d::DatakomD;
 use crate::datakom_dkg705::DatakomDkg705;
 use crate::error::{PinError, StartError};
+use crate::history::{self, History};
 use crate::inject::{self, Alarm, InjectError};
 use crate::levers::{Lever, LeverError, Position};
 use crate::panel::Panel;
@@ -17,7 +18,7 @@ use crate::pins;
 use crate::plant::{Plant, Supply};
 use crate::random::Random;
 use crate::rules::{COIL_OFF, COIL_ON, Permitted, Refusals, permit};
-use crate::scenario::{Player, Report};
+use crate::scenario::{Event, Player, Report};
 use crate::settings::{SettingError, Settings};
 use crate::smartgen_acc1700::{Acc1700, Model};
 use crate::smartgen_hat821si::Hat821si;
@@ -45,6 +46,11 @@ pub struct Device {
     seed: u64,
     answer_delay: Duration,
     player: Option<Player>,
+    history: Option<History>,
+    /// Levers that stand at a number by themselves, as a level does, and those of them that were pulled, each with where
+    /// it stood before.
+    levels: Vec<&'static str>,
+    moved: Vec<(&'static str, Position)>,
 }
 
 impl Device {
@@ -91,7 +97,12 @@ impl Device {
             seed,
             answer_delay,
             player: config.scenario.as_ref().map(|scenario| Player::new(scenario, model, seed)),
+            history: None,
+            levels: Vec::new(),
+            moved: Vec::new(),
         };
+        let is_level = |lever: &&Lever| matches!(device.lever(lever.id), Some(Position::Number(_)));
+        device.levels = device.levers().iter().filter(is_level).map(|lever| lever.id).collect();
         device.stir();
         device.play();
         Ok(device)
@@ -121,6 +132,9 @@ impl Device {
         if self.report().is_some_and(|report| !report.is_over()) {
             self.panel.render(&mut self.bank);
             self.play();
+        }
+        if History::is_due(self.clock) {
+            self.look();
         }
     }
 
@@ -168,6 +182,7 @@ impl Device {
             }
             Ok(Permitted::WriteCoil { address, on }) => {
                 self.panel.write_coil(address, on);
+                self.tell_of_write(address, u16::from(on));
                 self.panel.render(&mut self.bank);
                 Response::WriteSingleCoil { address, value: if on { COIL_ON } else { COIL_OFF } }
             }
@@ -239,13 +254,82 @@ impl Device {
             let nearest = busbar_profile::nearest(id, known.iter().copied());
             return Err(LeverError::Unknown { id: id.to_owned(), nearest, known });
         };
-        self.panel.pull(lever.id, lever.position(to)?);
+        let position = lever.position(to)?;
+        if self.levels.contains(&lever.id) && self.moved.iter().all(|(id, _)| *id != lever.id) {
+            self.moved.extend(self.lever(lever.id).map(|before| (lever.id, before)));
+        }
+        self.panel.pull(lever.id, position);
+        self.moved.retain(|(id, before)| *id != lever.id || !before.is_about(position));
+        let unit = lever.numbers.map_or("", |numbers| numbers.unit);
+        self.tell(|| match position {
+            Position::Word(word) => format!("{}: {}", lever.name, word.replace('_', " ")),
+            Position::Number(number) => format!("{}: {number} {unit}", lever.name).trim_end().to_owned(),
+        });
         Ok(())
+    }
+
+    /// Where a lever that was pulled goes back to: the word of a healthy plant, or the level that it had before. None
+    /// where there is nothing to put back.
+    pub fn back(&self, lever: &Lever) -> Option<Position> {
+        if self.levels.contains(&lever.id) {
+            return self.moved.iter().find(|(id, _)| *id == lever.id).map(|(_, before)| *before);
+        }
+        let healthy = Position::Word(lever.words.first()?.id);
+        self.lever(lever.id).filter(|position| *position != healthy).map(|_| healthy)
+    }
+
+    /// Puts a lever back to where [`back`](Self::back) says; nothing happens where there is nothing to put back.
+    fn put_back(&mut self, lever: &'static Lever) {
+        if let Some(position) = self.back(lever) {
+            self.panel.pull(lever.id, position);
+            self.moved.retain(|(id, _)| *id != lever.id);
+        }
+    }
+
+    /// Undoes what was done to the plant and its panel from outside: every lever is put back, injected alarms and pinned
+    /// points are let go. Settings stay as they are, and what the panel has latched is to be reset there.
+    pub fn restore(&mut self) {
+        for lever in self.levers() {
+            self.put_back(lever);
+        }
+        for Alarm { point, bit, .. } in std::mem::take(&mut self.injected) {
+            self.panel.inject(point, bit, false);
+        }
+        for index in self.pinned().collect::<Vec<_>>() {
+            self.bank.unpin(index);
+        }
+        self.panel.render(&mut self.bank);
+        self.tell(|| "All back to normal".to_owned());
     }
 
     /// Every alarm that the controller has.
     pub fn alarms(&self) -> impl Iterator<Item = Alarm> + use<> {
         inject::alarms(self.profile())
+    }
+
+    /// The alarms that a client would read as active now.
+    pub fn active(&self) -> Vec<Alarm> {
+        let profile = self.profile();
+        let active = |alarm: &Alarm| {
+            let point = profile.point(alarm.point).filter(|_| !self.is_silent())?;
+            let registers = self.registers(point.address, point.registers)?;
+            let value = point.decode(registers, profile.wire.word_order).value?;
+            Some(value.as_bits()?.contains(alarm.bit))
+        };
+        self.alarms().filter(|alarm| active(alarm) == Some(true)).collect()
+    }
+
+    /// Keeps from now on what happens, for [`lately`](Self::lately).
+    pub fn remember(&mut self) {
+        if self.history.is_none() {
+            self.history = Some(History::new(self));
+        }
+    }
+
+    /// What happened lately, the newest first: what was done, and what a person at the panel would have seen, looked at
+    /// once a second of simulated time. Nothing where nobody has asked to [`remember`](Self::remember).
+    pub fn lately(&self) -> impl Iterator<Item = &Event> {
+        self.history.iter().flat_map(History::events)
     }
 
     /// The alarms that are injected, in the order in which they were.
@@ -263,9 +347,14 @@ impl Device {
         if !self.panel.inject(alarm.point, alarm.bit, active) {
             return Err(InjectError::Derived { name: name.to_owned() });
         }
+        let was = self.injected.contains(&alarm);
         self.injected.retain(|known| *known != alarm);
         if active {
             self.injected.push(alarm);
+        }
+        if was != active {
+            let what = if active { "injected" } else { "let go" };
+            self.tell(|| format!("{} alarm {what}: {}", alarm.class, alarm.label));
         }
         Ok(())
     }
@@ -278,6 +367,7 @@ impl Device {
         let (index, registers) = pins::parse(self.profile(), point, text)?;
         self.bank.pin(index, &registers);
         self.panel.render(&mut self.bank);
+        self.tell(|| format!("{point} pinned"));
         Ok(())
     }
 
@@ -285,6 +375,9 @@ impl Device {
     pub fn unpin(&mut self, point: &str) -> bool {
         let unpinned = self.profile().point_index(point).is_some_and(|index| self.bank.unpin(index));
         self.panel.render(&mut self.bank);
+        if unpinned {
+            self.tell(|| format!("{point} let go"));
+        }
         unpinned
     }
 
@@ -307,6 +400,8 @@ impl Device {
         self.panel.configure(&self.settings);
         // Some are shown in registers.
         self.panel.render(&mut self.bank);
+        let number = self.settings.number(id);
+        self.tell(|| format!("Setting {id}: {number}"));
         Ok(())
     }
 
@@ -333,6 +428,28 @@ impl Device {
         }
     }
 
+    /// Looks at the panel, where somebody keeps what happens.
+    fn look(&mut self) {
+        if let Some(mut history) = self.history.take() {
+            self.panel.render(&mut self.bank);
+            history.look(self);
+            self.history = Some(history);
+        }
+    }
+
+    /// Notes what was done, where somebody keeps it.
+    fn tell(&mut self, what: impl FnOnce() -> String) {
+        let now = self.clock;
+        if let Some(history) = &mut self.history {
+            history.act(now, what());
+        }
+    }
+
+    fn tell_of_write(&mut self, address: u16, value: u16) {
+        let profile = self.profile();
+        self.tell(|| history::written(profile, address, value));
+    }
+
     /// Noise that depends on the seed and the time alone, however time was let pass.
     fn stir(&mut self) {
         let ticks = self.clock.as_millis() as u64 / STEP.as_millis() as u64;
@@ -342,6 +459,7 @@ impl Device {
     fn write(&mut self, address: u16, registers: Registers<'_>) {
         for (register, value) in (address..).zip(registers.iter()) {
             self.panel.write(register, value);
+            self.tell_of_write(register, value);
         }
         // Whoever reads back at once sees what he wrote.
         self.panel.render(&mut self.bank);

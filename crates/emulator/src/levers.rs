@@ -91,6 +91,16 @@ impl Lever {
     }
 }
 
+impl Position {
+    /// Whether it is the same, but for what a number loses on its way through a text.
+    pub(crate) fn is_about(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Number(one), Self::Number(other)) => (one - other).abs() < 1e-6,
+            (one, other) => one == other,
+        }
+    }
+}
+
 impl Word {
     pub(crate) const fn new(id: &'static str, meaning: &'static str) -> Self {
         Self { id, meaning }

@@ -18,6 +18,7 @@ mod error;
 mod facts;
 mod faults;
 mod fleet;
+mod history;
 mod inject;
 mod lcd;
 mod levers;

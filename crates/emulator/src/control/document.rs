@@ -29,7 +29,8 @@ const PROBLEMS: [(StatusCode, &str); 4] = [
 ];
 
 /// What may go wrong besides where there is a body.
-const PROBLEMS_OF_BODIES: [(StatusCode, &str); 2] = [
+const PROBLEMS_OF_BODIES: [(StatusCode, &str); 3] = [
+    (StatusCode::REQUEST_TIMEOUT, "The body did not come"),
     (StatusCode::PAYLOAD_TOO_LARGE, "The body is too large"),
     (StatusCode::UNSUPPORTED_MEDIA_TYPE, "The body is not said to be JSON"),
 ];
@@ -66,6 +67,8 @@ pub(super) fn routes() -> OpenApiRouter<Arc<Site>> {
         .routes(routes!(clock::step))
         .routes(routes!(plant::levers))
         .routes(routes!(plant::pull))
+        .routes(routes!(plant::restore))
+        .routes(routes!(plant::events))
         .routes(routes!(alarms::alarms))
         .routes(routes!(alarms::inject, alarms::release))
         .routes(routes!(pins::points))

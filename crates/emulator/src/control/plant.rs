@@ -8,9 +8,9 @@ use axum::extract::{Path, State};
 
 use super::problem::{Json, Problem};
 use super::site::{Site, named};
-use super::types::{LeverView, Pull};
+use super::types::{ControllerView, EventView, LeverView, Pull};
 use crate::device::Device;
-use crate::levers::LeverError;
+use crate::levers::{Lever, LeverError};
 
 /// The levers of a plant, with where they stand.
 #[utoipa::path(
@@ -58,5 +58,39 @@ pub(super) async fn pull(
 /// Every lever whose position is known.
 pub(super) fn levers_of(device: &Device) -> Vec<LeverView> {
     let levers = device.levers().iter();
-    levers.filter_map(|lever| Some(LeverView::of(lever, device.lever(lever.id)?))).collect()
+    let view = |lever: &Lever| Some(LeverView::of(lever, device.lever(lever.id)?, device.back(lever)));
+    levers.filter_map(view).collect()
+}
+
+/// Puts everything back to normal: every lever, every injected alarm, every pinned point.
+///
+/// Settings stay as they are. What the panel has latched stays until it is reset there, as on site.
+#[utoipa::path(
+    put, path = "/api/v1/controllers/{controller}/normal", tag = "plant",
+    params(("controller" = String, Path, description = "Its id", example = "genset-1")),
+    responses((status = OK, body = ControllerView, description = "The controller, with nothing done to it")),
+)]
+pub(super) async fn restore(
+    State(site): State<Arc<Site>>,
+    id: Result<Path<String>, PathRejection>,
+) -> Result<Answer<ControllerView>, Problem> {
+    let imitated = site.one(&named(id)?)?;
+    imitated.controller.with(Device::restore);
+    Ok(Answer(ControllerView::of(imitated)))
+}
+
+/// What happened lately, the newest first: what was done, and what a person at the panel would have seen of that.
+///
+/// The panel is looked at once a second of simulated time, and the last 200 events are kept.
+#[utoipa::path(
+    get, path = "/api/v1/controllers/{controller}/events", tag = "plant",
+    params(("controller" = String, Path, description = "Its id", example = "genset-1")),
+    responses((status = OK, body = Vec<EventView>, description = "The events")),
+)]
+pub(super) async fn events(
+    State(site): State<Arc<Site>>,
+    id: Result<Path<String>, PathRejection>,
+) -> Result<Answer<Vec<EventView>>, Problem> {
+    let controller = &site.one(&named(id)?)?.controller;
+    Ok(Answer(controller.with(|device| device.lately().map(EventView::of).collect())))
 }

@@ -1,5 +1,7 @@
 //! What went wrong with a request: RFC 9457 problem documents, and bodies that are refused with one.
 
+use std::time::Duration;
+
 use axum::body::Bytes;
 use axum::extract::rejection::BytesRejection;
 use axum::extract::{FromRequest, Request};
@@ -7,6 +9,7 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use tokio::time::timeout;
 use utoipa::ToSchema;
 
 use crate::PinProblem;
@@ -18,6 +21,9 @@ use crate::settings::SettingError;
 
 /// The largest body that is read: a picture as hexadecimal fits.
 pub(super) const LARGEST_BODY: usize = 8 * 1024;
+
+/// A client has this long to send a body.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Why a request was not answered as asked, as `application/problem+json`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, ToSchema)]
@@ -128,8 +134,13 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
             let detail = "the body is not said to be JSON; send it with Content-Type: application/json";
             return Err(Problem::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, detail));
         }
-        let bytes = Bytes::from_request(request, state).await.map_err(|rejection| unread(&rejection))?;
-        serde_json::from_slice(&bytes).map(Self).map_err(|error| {
+        // What is announced is believed: nobody waits for a body that is not taken anyway.
+        if announced(request.headers()).is_some_and(|length| length > LARGEST_BODY as u64) {
+            return Err(too_large());
+        }
+        let bytes = timeout(PATIENCE, Bytes::from_request(request, state)).await;
+        let bytes = bytes.map_err(|_| late())?.map_err(|rejection| unread(&rejection))?;
+        parse(&bytes).map(Self).map_err(|error| {
             let detail =
                 format!("the body is not what is needed: {error}; openapi.json lists what it may hold");
             Problem::new(StatusCode::BAD_REQUEST, detail)
@@ -137,12 +148,32 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
     }
 }
 
+/// An object, and what is wrong with any other body in words that need no knowledge of the program.
+fn parse<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+    // A list would pass for the values of an object in their order.
+    if bytes.trim_ascii_start().starts_with(b"[") {
+        return Err("it is a list, and an object is needed".to_owned());
+    }
+    serde_json::from_slice(bytes).map_err(|error| error.to_string().replace("f64", "a number"))
+}
+
+fn announced(headers: &HeaderMap) -> Option<u64> {
+    headers.get(header::CONTENT_LENGTH)?.to_str().ok()?.parse().ok()
+}
+
+fn too_large() -> Problem {
+    let detail = format!("the body has more than the {LARGEST_BODY} bytes that are taken; send less");
+    Problem::new(StatusCode::PAYLOAD_TOO_LARGE, detail)
+}
+
+fn late() -> Problem {
+    let detail = format!("the body did not come within {} s; send all of it", PATIENCE.as_secs());
+    Problem::new(StatusCode::REQUEST_TIMEOUT, detail)
+}
+
 fn unread(rejection: &BytesRejection) -> Problem {
     match rejection.status() {
-        StatusCode::PAYLOAD_TOO_LARGE => Problem::new(
-            StatusCode::PAYLOAD_TOO_LARGE,
-            format!("the body has more than the {LARGEST_BODY} bytes that are taken; send less"),
-        ),
+        StatusCode::PAYLOAD_TOO_LARGE => too_large(),
         _ => Problem::new(StatusCode::BAD_REQUEST, "the body broke off; send all of it"),
     }
 }

@@ -5,6 +5,7 @@ use axum::extract::rejection::PathRejection;
 use axum::http::StatusCode;
 
 use super::problem::Problem;
+use crate::device::Device;
 use crate::server::Controller;
 
 /// One controller under an id.
@@ -26,6 +27,9 @@ pub(super) struct Site {
 
 impl Site {
     pub(super) fn new(imitated: Vec<Imitated>) -> Self {
+        for each in &imitated {
+            each.controller.with(Device::remember);
+        }
         Self { imitated }
     }
 

@@ -8,8 +8,10 @@ use utoipa::{PartialSchema, ToSchema};
 
 use super::plant::levers_of;
 use super::site::Imitated;
+use crate::device::Device;
 use crate::inject::Alarm;
 use crate::levers::{Lever, Position};
+use crate::scenario::{Event, EventKind, Report};
 use crate::server::Controller;
 
 /// One imitated controller: what it is, how its clock runs, and what was done to it.
@@ -47,9 +49,55 @@ pub(super) struct ControllerView {
     pub(super) levers: Vec<LeverView>,
     /// The alarms that are injected, in the order in which they were.
     pub(super) injected: Vec<AlarmView>,
+    /// The alarms that a client reads as active now, injected or not.
+    pub(super) active: Vec<AlarmView>,
+    /// The scenario that is played; null where none is.
+    #[schema(required)]
+    pub(super) scenario: Option<ScenarioView>,
     /// Ids of the points that are pinned.
     #[schema(examples(json!(["battery_voltage"])))]
     pub(super) pinned: Vec<&'static str>,
+}
+
+/// What has become of a scenario so far.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub(super) struct ScenarioView {
+    /// What it is called.
+    #[schema(examples("Mains failure and return"))]
+    pub(super) title: String,
+    /// How many steps it has.
+    pub(super) steps: usize,
+    /// How many of them were taken.
+    pub(super) taken: usize,
+    /// How many expectations have failed.
+    pub(super) failed: usize,
+    /// Whether everything that was expected came; null while it is played.
+    #[schema(required)]
+    pub(super) held: Option<bool>,
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub(super) struct EventView {
+    /// When, in simulated seconds since power-on.
+    #[schema(examples(12.5))]
+    pub(super) at_s: f64,
+    /// Whether somebody did it (`action`), or the panel showed it (`change`).
+    #[schema(examples("action"))]
+    pub(super) kind: EventKindView,
+    /// What, in words.
+    #[schema(examples("Mains: failed"))]
+    pub(super) text: String,
+}
+
+/// What kind of event it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum EventKindView {
+    /// Somebody did it.
+    Action,
+    /// The panel showed it.
+    Change,
 }
 
 /// What kind of controller it is.
@@ -79,7 +127,7 @@ pub(super) struct ClockView {
 
 /// How a clock is to run; what is left out stays as it is.
 #[derive(Clone, Debug, Default, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object")]
 pub(super) struct ClockChange {
     /// Simulated seconds a second: above 0 and up to 3600.
     #[serde(default, deserialize_with = "given")]
@@ -93,7 +141,7 @@ pub(super) struct ClockChange {
 
 /// How far a clock is to go on at once.
 #[derive(Clone, Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object")]
 pub(super) struct Step {
     /// Simulated seconds, up to an hour.
     #[schema(exclusive_minimum = 0, maximum = 3600, examples(10))]
@@ -116,6 +164,9 @@ pub(super) struct LeverView {
     pub(super) numbers: Option<NumbersView>,
     /// Where it stands.
     pub(super) position: Given,
+    /// Where it was before somebody pulled it; null where there is nothing to put back.
+    #[schema(required)]
+    pub(super) back: Option<Given>,
 }
 
 /// A word that a lever can be set to.
@@ -143,7 +194,7 @@ pub(super) struct NumbersView {
 
 /// Where a lever is to stand.
 #[derive(Clone, Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object")]
 pub(super) struct Pull {
     /// One of its words, or a number in its range.
     pub(super) position: Given,
@@ -198,7 +249,7 @@ pub(super) struct PointView {
 
 /// What a point is to be kept at.
 #[derive(Clone, Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object")]
 pub(super) struct Pin {
     /// As `--set` takes it: a number, the id of a choice, ids of bits with commas between them, `none`, or `absent`.
     pub(super) value: Given,
@@ -227,7 +278,7 @@ pub(super) struct SettingView {
 
 /// What a setting is to be.
 #[derive(Clone, Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object")]
 pub(super) struct Set {
     /// A number in its range.
     pub(super) value: Given,
@@ -309,9 +360,38 @@ impl ControllerView {
                 clock,
                 levers: levers_of(device),
                 injected: device.injected().iter().map(|alarm| AlarmView::of(alarm, true)).collect(),
+                active: active_of(device),
+                scenario: device.report().map(ScenarioView::of),
                 pinned: device.pinned().filter_map(|index| Some(&*profile.points.get(index)?.id)).collect(),
             }
         })
+    }
+}
+
+fn active_of(device: &Device) -> Vec<AlarmView> {
+    let injected = device.injected();
+    device.active().iter().map(|alarm| AlarmView::of(alarm, injected.contains(alarm))).collect()
+}
+
+impl ScenarioView {
+    fn of(report: &Report) -> Self {
+        Self {
+            title: report.title.clone(),
+            steps: report.steps,
+            taken: report.taken,
+            failed: report.failures().count(),
+            held: report.held,
+        }
+    }
+}
+
+impl EventView {
+    pub(super) fn of(event: &Event) -> Self {
+        let kind = match event.kind {
+            EventKind::Action => EventKindView::Action,
+            _ => EventKindView::Change,
+        };
+        Self { at_s: event.at.as_secs_f64(), kind, text: event.text.clone() }
     }
 }
 
@@ -324,7 +404,7 @@ impl ClockView {
 }
 
 impl LeverView {
-    pub(super) fn of(lever: &Lever, position: Position) -> Self {
+    pub(super) fn of(lever: &Lever, position: Position, back: Option<Position>) -> Self {
         Self {
             id: lever.id,
             name: lever.name,
@@ -335,6 +415,7 @@ impl LeverView {
                 unit: numbers.unit,
             }),
             position: position.into(),
+            back: back.map(Given::from),
         }
     }
 }

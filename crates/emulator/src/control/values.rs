@@ -61,8 +61,9 @@ pub(super) async fn values(
 ) -> Result<Answer<Vec<ValueView>>, Problem> {
     let controller = &site.one(&named(id)?)?.controller;
     let Query(ValuesQuery { name }) = query.map_err(|rejection| {
-        let detail =
-            format!("the query is not understood: {}; name is all it may hold", rejection.body_text());
+        let why = rejection.body_text();
+        let why = why.strip_prefix("Failed to deserialize query string: ").unwrap_or(&why);
+        let detail = format!("the query is not understood: {why}; name is all it may hold");
         Problem::new(StatusCode::BAD_REQUEST, detail)
     })?;
     let profile = controller.with(|device| device.profile());

@@ -45,7 +45,7 @@ use identity::Identity;
 use keys::Menu;
 use loss_of_mains::LossOfMains;
 use mains::Mains;
-use operation::Operation::{Exporting, MainsBreakerTimer, WaitBeforeFuel};
+use operation::Operation::{Exporting, MainsBreakerTimer, TransferToMains, WaitBeforeFuel};
 use readings::Readings;
 use regulation::Regulation;
 use sequence::{Demand, Sensed, Sequence, Source};
@@ -185,7 +185,8 @@ impl DatakomD {
             Mode::Stop => Demand::REST,
             Mode::Run => {
                 let chosen = Demand { engine: self.run_wanted, source: self.source };
-                let helps = self.settings.emergency_backup && chosen == Demand::OFF_LOAD;
+                // Mains that fail leave a genset beside them the load.
+                let helps = chosen.parallel() || self.settings.emergency_backup && chosen == Demand::OFF_LOAD;
                 causes.backup().filter(|_| helps).unwrap_or(chosen)
             }
             Mode::Test => Demand::ON_LOAD,
@@ -251,7 +252,7 @@ impl DatakomD {
             running: self.readings.running,
             protected: self.sequence.operation().is_up_to_speed(),
             parallel: self.readings.side_by_side,
-            exporting: self.sequence.operation() == Exporting,
+            exporting: matches!(self.sequence.operation(), Exporting | TransferToMains),
             lenient: self.contacts.protections_disabled,
         };
         let breakers = Breakers {

@@ -282,7 +282,7 @@ mod tests {
             Running => "engine running",
             Protected => "protections live",
             Parallel => "both breakers closed",
-            Importing => "both breakers closed, not in 15",
+            Importing => "both breakers closed, not in 15 and 18",
         };
         let limit = match rule.limit {
             Below(id, _) => format!("below `{id}`"),

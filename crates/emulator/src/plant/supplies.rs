@@ -120,7 +120,8 @@ impl Battery {
             (true, ..) => (rest + 1.5 - sag, 0.15),
             (_, true, _) => (f64::min(28.2, rest + 6.0), 4.0),
             (_, _, true) => (f64::min(27.1, rest + 2.5), 6.0),
-            _ => (rest, 60.0),
+            // The starter lets it recover at once; what a charger has put on top goes slowly.
+            _ => (rest, if self.voltage < rest { 1.5 } else { 60.0 }),
         };
         approach(&mut self.voltage, (target + ripple).max(2.0), memory, dt);
 

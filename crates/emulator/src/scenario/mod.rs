@@ -26,6 +26,7 @@ use crate::config::Config;
 use crate::notes::Place;
 use condition::Condition;
 
+pub(crate) use narrator::Narrator;
 pub(crate) use player::Player;
 pub use report::{Check, CheckVerdict, Event, EventKind, Report, Seen};
 

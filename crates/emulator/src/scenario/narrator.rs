@@ -10,7 +10,7 @@ const TOLD: [&str; 2] = ["breaker.", "mains.failed"];
 
 /// What was told last.
 #[derive(Clone, Debug)]
-pub(super) struct Narrator {
+pub(crate) struct Narrator {
     flags: Vec<(Subject, Fact)>,
     /// Points with alarms, and those that are active; points that tell a state, by signal and what it was.
     alarms: Vec<(usize, BitSet)>,
@@ -19,7 +19,7 @@ pub(super) struct Narrator {
 
 impl Narrator {
     /// Everything that stands now is known and not told.
-    pub(super) fn new(device: &Device) -> Self {
+    pub(crate) fn new(device: &Device) -> Self {
         let profile = device.profile();
         let told = |subject: &Subject| {
             *subject.kind() == FactKind::Flag && TOLD.iter().any(|start| subject.name().starts_with(start))
@@ -41,7 +41,7 @@ impl Narrator {
     }
 
     /// What has changed since it was asked last.
-    pub(super) fn changes(&mut self, device: &Device) -> Vec<String> {
+    pub(crate) fn changes(&mut self, device: &Device) -> Vec<String> {
         let mut changes = Vec::new();
         for (index, signal, known) in &mut self.states {
             let now = value(device, *index).and_then(|value| state(device.profile(), *index, &value));

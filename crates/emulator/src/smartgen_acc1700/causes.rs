@@ -111,10 +111,11 @@ impl View<'_> {
         if self.sequence.status().is_watched() { verdict } else { Verdict::Fine }
     }
 
-    /// A speed that is there, and too low.
+    /// A speed that is there, and too low where the engine is not told to idle.
     fn slow(&self, limit: f64) -> Verdict {
         match self.readings.speed {
             Reading::Value(0.0) => Verdict::Fine,
+            _ if self.sequence.orders().idle => Verdict::Fine,
             speed => self.watched(low(speed, limit, RPM)),
         }
     }

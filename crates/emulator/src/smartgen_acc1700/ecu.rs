@@ -45,7 +45,7 @@ impl Ecu {
         Self { talks: true, warns: false, stops: false, filter: Filter::default() }
     }
 
-    /// `watched` is whether the engine has had time to build up its oil pressure.
+    /// `watched` is whether the engine has had time to build up its oil pressure; one that dies has no reason to.
     pub(super) fn step(&mut self, plant: &Compressor, watched: bool) {
         self.talks = !plant.ecu_silent;
         if !self.talks {
@@ -55,7 +55,9 @@ impl Ecu {
         let blind = senders.coolant.is_none() || senders.oil_pressure.is_none() || senders.speed.is_none();
         let beyond = |(degc, bar): (f64, f64)| {
             senders.coolant.is_some_and(|coolant| coolant > degc)
-                || watched && senders.oil_pressure.is_some_and(|pressure| pressure < bar)
+                || watched
+                    && plant.engine.is_running()
+                    && senders.oil_pressure.is_some_and(|pressure| pressure < bar)
         };
         self.filter = Filter {
             failed: plant.filter.has_failed(),

@@ -163,7 +163,7 @@ impl Sequence {
         self.status == Status::NormalRunning
     }
 
-    /// A stop waits for the discharge pressure to fall; the cooling delay stands still.
+    /// A stop waits for the discharge pressure to fall; the delay stands still.
     pub(super) fn waits_for_pressure(&self) -> bool {
         self.waits_for_pressure
     }
@@ -222,7 +222,7 @@ impl Sequence {
     }
 
     fn waits(&self, sensed: Sensed, setup: &Setup) -> bool {
-        self.status == Status::Cooling
+        matches!(self.status, Status::Cooling | Status::StopIdle)
             && self.waited < setup.stop_pressure_time
             && sensed.pressure.is_some_and(|pressure| pressure > setup.stop_pressure)
     }
@@ -243,10 +243,13 @@ impl Sequence {
             Status::SafetyOn => self.starts = self.starts.saturating_add(1),
             _ => {}
         }
+        // One stop waits once, cooling or, where there is nothing to cool, idling.
+        if (self.status, next) != (Status::Cooling, Status::StopIdle) {
+            self.waited = Duration::ZERO;
+        }
         self.status = next;
         self.timer = setup.delay(next);
         self.waits_for_pressure = false;
-        self.waited = Duration::ZERO;
     }
 }
 
@@ -403,6 +406,22 @@ mod tests {
         }
         assert_eq!((bench.status(), bench.sequence.seconds_left()), (Cooling, 15));
         assert!(!bench.sequence.waits_for_pressure());
+    }
+
+    #[test]
+    fn a_stop_that_has_nothing_to_cool_waits_at_idle() {
+        let mut bench = Bench::new(&[("stop_pressure_time", "60")]);
+        bench.react(Cause::StartKey);
+        bench.walk(StartIdle, |_| RUNNING);
+        bench.react(Cause::StopKey);
+        for _ in 0..600 {
+            bench.step(Sensed { pressure: Some(201.0), ..RUNNING });
+            assert_eq!((bench.status(), bench.sequence.seconds_left()), (StopIdle, 10));
+            assert!(bench.sequence.orders().idle && bench.sequence.orders().blow_down);
+        }
+        bench.step(Sensed { pressure: Some(201.0), ..RUNNING });
+        assert!(!bench.sequence.waits_for_pressure());
+        assert_eq!(bench.walk(EnergiseToStop, |_| RUNNING), [StopIdle, EnergiseToStop]);
     }
 
     #[test]

@@ -177,20 +177,14 @@ impl Board {
         true
     }
 
-    fn all(&self) -> impl Iterator<Item = Alarm> {
-        let all: BTreeSet<Alarm> =
-            [&self.latched, &self.standing, &self.injected].into_iter().flatten().copied().collect();
-        all.into_iter()
-    }
-
-    /// How many there are, without those that follow from others.
-    pub(super) fn count(&self) -> usize {
-        self.all().count()
+    /// All of them, without those that follow from others.
+    pub(super) fn active(&self) -> BTreeSet<Alarm> {
+        [&self.latched, &self.standing, &self.injected].into_iter().flatten().copied().collect()
     }
 
     /// The bits of one word, with those that follow.
     pub(super) fn word(&self, word: u16) -> BitSet {
-        let own = self.all().filter(|alarm| alarm.word == word).map(|alarm| alarm.bit);
+        let own = self.active().into_iter().filter(|alarm| alarm.word == word).map(|alarm| alarm.bit);
         let derived = DERIVED.into_iter().filter(|alarm| alarm.word == word && self.follows(*alarm));
         own.chain(derived.map(|alarm| alarm.bit)).collect()
     }
@@ -234,11 +228,11 @@ mod tests {
         let mut board = Board::default();
         board.latch(Alarm::GROUND_FAULT);
         board.follow(Alarm::OVERLOAD, true);
-        assert_eq!((bits(&board, 503), bits(&board, 504), board.count()), (vec![3], vec![3], 2));
+        assert_eq!((bits(&board, 503), bits(&board, 504), board.active().len()), (vec![3], vec![3], 2));
         board.reset();
         assert!(!board.has(Alarm::GROUND_FAULT) && board.has(Alarm::OVERLOAD));
         board.follow(Alarm::OVERLOAD, false);
-        assert_eq!(board.count(), 0);
+        assert_eq!(board.active().len(), 0);
     }
 
     #[test]
@@ -252,7 +246,7 @@ mod tests {
         assert_eq!(bits(&board, 503), [0, 1], "a fault stays until it is reset");
         assert!(bits(&board, 504).is_empty(), "a warning does not");
         board.reset();
-        assert_eq!(board.count(), 0);
+        assert_eq!(board.active().len(), 0);
     }
 
     #[test]

@@ -41,11 +41,6 @@ impl Bars {
             && !(over_tie && supplies.into_iter().any(|source| self.no_supply_over_tie[source]))
     }
 
-    /// A switch is closed that has to be open.
-    pub(super) fn forbid_present(&self) -> bool {
-        Switch::ALL.into_iter().any(|switch| self.locked.is_closed(switch) && self.now.is_closed(switch))
-    }
-
     /// What is left of a position without the switches that have to be open or did not close.
     fn left_of(&self, position: Positions) -> Positions {
         Positions::by(|switch| {
@@ -71,12 +66,24 @@ pub(super) struct Scene {
     pub(super) auto: bool,
     pub(super) masters: [bool; 2],
     pub(super) available: [bool; 2],
+    /// Those of them with which nothing is wrong at this moment.
+    pub(super) faultless: [bool; 2],
     /// Sources that are there only because a genset stands in for their mains.
     pub(super) guests: [bool; 2],
+    /// Sources whose genset is to stop when another one has taken its load over.
+    pub(super) leaving: [bool; 2],
     pub(super) restores: bool,
     /// Everything has to be open.
     pub(super) forced_open: bool,
     pub(super) bars: Bars,
+}
+
+impl Scene {
+    /// A source in doubt would be given something that it does not feed yet.
+    fn doubts(&self, position: Positions) -> bool {
+        let (now, then) = (self.bars.now.feeds(), position.feeds());
+        (0..2).any(|source| !self.faultless[source] && (0..2).any(|it| then[it][source] && !now[it][source]))
+    }
 }
 
 impl Control {
@@ -111,9 +118,9 @@ impl Control {
             |source: usize| scene.available[source] && bars.permits_switch(Switch::OF_SOURCES[source]);
         let usable = [usable(0), usable(1)];
         let guest = |source: usize| usable[source] && scene.guests[source];
-        // A genset is relieved as soon as there are mains.
-        let chosen = [0, 1]
-            .map(|source| usable[source] && !(guest(source) && usable[1 - source] && !guest(1 - source)));
+        // A genset is relieved as soon as there are mains, or the set whose turn it is.
+        let goes = |source: usize| scene.leaving[source] || guest(source) && !guest(1 - source);
+        let chosen = [0, 1].map(|source| usable[source] && !(usable[1 - source] && goes(source)));
         let wishes: &[Positions] = match (chosen, scene.masters) {
             ([true, true], [true, false]) => &[FROM_S1, NORMAL],
             ([true, true], [false, true]) => &[FROM_S2, NORMAL],
@@ -129,18 +136,20 @@ impl Control {
         if self.settled && !scene.restores && serves {
             return self.target;
         }
-        self.settled = true;
         let wish = wishes
             .iter()
             .copied()
             .find(|wish| bars.permit(*wish) && (0..2).all(|source| usable[source] || !feeds(*wish, source)));
+        // Nothing is closed onto a source that may be given up in a moment.
+        let wish = wish.filter(|wish| *wish == self.target || !scene.doubts(*wish));
+        self.settled = true;
         wish.unwrap_or_else(|| bars.left_of(self.target))
     }
 
     /// A command for a position; ignored where a source or a switch does not permit it.
     pub(super) fn transfer(&mut self, to: Positions, scene: Scene) {
         let dead = (0..2).any(|source| to.is_closed(Switch::OF_SOURCES[source]) && !scene.available[source]);
-        if dead || scene.forced_open || !scene.bars.permit(to) {
+        if dead || scene.doubts(to) || scene.forced_open || !scene.bars.permit(to) {
             return;
         }
         self.target = to;
@@ -162,7 +171,9 @@ mod tests {
             auto: true,
             masters: [true; 2],
             available: [true; 2],
+            faultless: [true; 2],
             guests: [false; 2],
+            leaving: [false; 2],
             restores: true,
             forced_open: false,
             bars: Bars::default(),
@@ -200,6 +211,8 @@ mod tests {
         let bars = Bars { inhibited: Positions::of(0, 1, 0), ..Bars::default() };
         assert_eq!(wish(&mut control, Scene { bars, ..guest }), [1, 0, 1], "section 2 has nobody else");
         assert_eq!(wish(&mut control, Scene { guests: [true; 2], ..scene() }), [1, 0, 1]);
+        let turn = Scene { guests: [true; 2], leaving: [true, false], ..scene() };
+        assert_eq!(wish(&mut control, turn), [0, 1, 1], "the turn of the other set");
         let lazy = Scene { restores: false, ..guest };
         assert_eq!(wish(&mut control, lazy), [1, 1, 0]);
     }
@@ -253,6 +266,24 @@ mod tests {
             [0, 0, 0],
             "until somebody closes it"
         );
+    }
+
+    #[test]
+    fn nothing_is_closed_onto_a_source_in_doubt() {
+        let bars = Bars { now: NORMAL, ..Bars::default() };
+        let lost = Scene { available: [false, true], bars, ..scene() };
+        let doubted = Scene { faultless: [false; 2], ..lost };
+        let mut control = Control::new(NORMAL);
+        assert_eq!(wish(&mut control, doubted), [1, 0, 1], "nor anything opened for it");
+        assert_eq!(wish(&mut control, Scene { faultless: [false, true], ..lost }), [0, 1, 1]);
+        assert_eq!(wish(&mut control, doubted), [0, 1, 1], "what has begun goes on");
+
+        let mut control = Control::new(NORMAL);
+        let doubted = Scene { faultless: [true, false], bars, ..scene() };
+        control.transfer(FROM_S2, doubted);
+        assert_eq!(control.target(), NORMAL, "a command neither");
+        control.transfer(FROM_S1, doubted);
+        assert_eq!(control.target(), FROM_S1);
     }
 
     #[test]

@@ -82,6 +82,8 @@ pub(super) struct Scene<'a> {
     pub(super) on_genset: [bool; 2],
     /// A genset feeds a section in place of its mains.
     pub(super) serves: bool,
+    /// Sets that feed a section, for whatever reason.
+    pub(super) feeds: [bool; 2],
     /// Contacts of the site.
     pub(super) on_load_input: bool,
     pub(super) off_load_input: bool,
@@ -108,8 +110,9 @@ impl State {
         Edge::new(Self::StartDelay, Self::Standby, "no cause any more"),
         Edge::new(Self::StartDelay, Self::Started, "start delay over"),
         Edge::new(Self::Started, Self::StopDelay, "no cause any more"),
+        Edge::new(Self::Started, Self::Standby, "no set without a fault"),
         Edge::new(Self::StopDelay, Self::Started, "a cause again"),
-        Edge::new(Self::StopDelay, Self::Standby, "stop delay over"),
+        Edge::new(Self::StopDelay, Self::Standby, "stop delay over, or no set without a fault"),
     ];
 }
 
@@ -144,7 +147,7 @@ pub(super) struct Genset {
     scheduled: Option<Duration>,
     /// The set that is to run: 0 behind source 1, 1 behind source 2.
     chosen: usize,
-    /// The set that goes on until the chosen one runs.
+    /// The set that goes on until the chosen one has taken its load over.
     relieved: Option<usize>,
     signals: [bool; 2],
     /// How long a set was asked to run and did not.
@@ -179,22 +182,25 @@ impl Genset {
         }
     }
 
-    /// A remote command: start, or stop.
-    pub(super) fn command(&mut self, start: bool) {
+    /// A remote command: start, or stop. In manual mode a stop is one whatever the set runs for.
+    pub(super) fn command(&mut self, start: bool, auto: bool) {
         self.commanded = start;
+        self.causes.mains_abnormal &= start || auto;
     }
 
     pub(super) fn step(&mut self, dt: Duration, scene: Scene<'_>, board: &mut Board) {
-        self.weigh(scene);
         let limits = scene.limits;
         let works = [0, 1].map(|set| limits.behind[set] && !board.has(Alarm::genset(set)));
-        let wanted = self.causes.any() && works != [false; 2];
+        let can = works != [false; 2];
+        self.weigh(scene, can);
+        let wanted = self.causes.any() && can;
         self.timer.step(dt);
         let elapsed = self.timer.is_over();
         match (self.state, wanted) {
             (State::Standby, true) => self.enter(State::StartDelay, limits.start),
             (State::StartDelay, true) if elapsed => self.enter(State::Started, Duration::ZERO),
             (State::StartDelay, false) => self.enter(State::Standby, Duration::ZERO),
+            (State::Started | State::StopDelay, false) if !can => self.enter(State::Standby, Duration::ZERO),
             (State::Started, false) => self.enter(State::StopDelay, limits.stop),
             (State::StopDelay, true) => self.enter(State::Started, Duration::ZERO),
             (State::StopDelay, false) if elapsed => self.enter(State::Standby, Duration::ZERO),
@@ -204,8 +210,8 @@ impl Genset {
         self.watch(dt, scene, board);
     }
 
-    /// Works out why one is to run.
-    fn weigh(&mut self, scene: Scene<'_>) {
+    /// Works out why one is to run; `can` says that there is one without a fault.
+    fn weigh(&mut self, scene: Scene<'_>, can: bool) {
         let limits = scene.limits;
         (self.choice, self.two) = (limits.choice, limits.are_two());
         self.not_scheduled = limits.not_run.and_then(|window| window.left(scene.now));
@@ -214,14 +220,18 @@ impl Genset {
         let by_mains = |source: usize| scene.available[source] && !scene.on_genset[source];
         // Once there are mains again it goes on until they have taken over.
         let relieved = (by_mains(0) || by_mains(1)) && !(self.causes.mains_abnormal && scene.serves);
-        let mains_abnormal = scene.auto && !relieved;
-        let may = !self.inhibited;
-        let by_clock = may && self.not_scheduled.is_none();
+        let runs = matches!(self.state, State::Started | State::StopDelay);
+        // In manual mode nothing starts by itself, and nobody but a person stops what runs.
+        let goes_on = !scene.auto && runs;
+        let may = limits.behind != [false; 2] && (!self.inhibited || goes_on);
+        let by_clock = may && scene.auto && self.not_scheduled.is_none();
+        // A start that cannot be obeyed is forgotten, or the set would start when nobody expects it.
+        self.commanded &= may && can;
         self.causes = Causes {
             on_load: may && scene.on_load_input,
             off_load: may && (self.commanded || scene.off_load_input),
-            mains_abnormal: by_clock && mains_abnormal,
-            scheduled: by_clock && scene.auto && self.scheduled.is_some(),
+            mains_abnormal: !relieved && (by_clock || may && goes_on && self.causes.mains_abnormal),
+            scheduled: by_clock && self.scheduled.is_some(),
         };
         self.carries = self.causes.on_load || self.causes.scheduled && limits.runs_on_load;
     }
@@ -246,7 +256,11 @@ impl Genset {
                 Choice::Master => usize::from(!scene.masters[0]),
                 Choice::Balanced => usize::from(self.hours[1] < self.hours[0]),
             };
-        } else if works == [true; 2] && limits.choice == Choice::Cycle && self.state == State::Started {
+        } else if scene.auto
+            && works == [true; 2]
+            && limits.choice == Choice::Cycle
+            && self.state == State::Started
+        {
             self.turn += dt;
             if self.turn >= limits.turns[self.chosen] {
                 self.relieved = Some(self.chosen);
@@ -258,7 +272,7 @@ impl Genset {
             self.chosen = 1 - self.chosen;
             self.turn = Duration::ZERO;
         }
-        if scene.runs[self.chosen] {
+        if scene.runs[self.chosen] && self.relieved.is_some_and(|set| !scene.feeds[set]) {
             self.relieved = None;
         }
         self.signals =
@@ -286,6 +300,11 @@ impl Genset {
     /// The start signals of the sets behind source 1 and source 2.
     pub(super) fn signals(&self) -> [bool; 2] {
         self.signals
+    }
+
+    /// Sets that are to stop as soon as another one has taken their load over.
+    pub(super) fn leaving(&self) -> [bool; 2] {
+        [0, 1].map(|set| self.relieved == Some(set))
     }
 
     /// What runs is to carry load even while its mains are there.

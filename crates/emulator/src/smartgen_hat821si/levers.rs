@@ -21,12 +21,17 @@ const MAINS: &[Word] = &[
 const GRID: &[Word] =
     &[Word::new("normal", "It feeds both"), Word::new("failed", "Neither source has voltage from it")];
 const NORMAL: &[Word] = &[Word::new("normal", "As it is by itself")];
+const WILL_NOT_CLOSE: Word = Word::new("will_not_close", "It stays open when it is to close");
+const WILL_NOT_OPEN: Word = Word::new("will_not_open", "It stays closed, whoever is to open it");
+const TRIPS: Word = Word::new("trips", "Its release opens it and keeps it open");
 const SWITCH: &[Word] = &[
     Word::new("normal", "It does as it is told"),
-    Word::new("will_not_close", "It stays open when it is to close"),
-    Word::new("will_not_open", "It stays closed when it is to open"),
-    Word::new("trips", "Its release opens it and keeps it open"),
+    WILL_NOT_CLOSE,
+    Word::new("closes_at_second", "Of its closing pulses the first one does nothing"),
+    WILL_NOT_OPEN,
+    TRIPS,
 ];
+const FEEDER: &[Word] = &[Word::new("normal", "It does as it is told"), WILL_NOT_CLOSE, WILL_NOT_OPEN, TRIPS];
 const POSITION: &[Word] =
     &[Word::new("work", "In its place"), Word::new("test", "Drawn out: it moves, and carries nothing")];
 const WIRE: &[Word] = &[
@@ -60,7 +65,7 @@ macro_rules! levers {
                 Lever::of_words(
                     concat!("switch.l", $side, "_", $number),
                     concat!("Load switch ", $side, "-", $number),
-                    SWITCH,
+                    FEEDER,
                 ),
                 Lever::of_words(
                     concat!("switch.l", $side, "_", $number, ".position"),
@@ -388,6 +393,7 @@ fn mains_word(mains: Mains) -> &'static str {
 fn condition(word: &str) -> Condition {
     match word {
         "will_not_close" => Condition::WillNotClose,
+        "closes_at_second" => Condition::ClosesAtSecond,
         "will_not_open" => Condition::WillNotOpen,
         "trips" => Condition::Trips,
         _ => Condition::Normal,
@@ -398,6 +404,7 @@ fn switch_word(condition: Condition) -> &'static str {
     match condition {
         Condition::Normal => "normal",
         Condition::WillNotClose => "will_not_close",
+        Condition::ClosesAtSecond => "closes_at_second",
         Condition::WillNotOpen => "will_not_open",
         Condition::Trips => "trips",
     }

@@ -114,10 +114,12 @@ impl Loads {
     }
 
     pub(super) fn step(&mut self, dt: Duration, around: Around<'_>, board: &mut Board) {
+        // One that falls in the moment in which the voltage comes back has fallen too.
+        let dead = !around.alive || !self.dead_for.is_zero();
         self.dead_for = if around.alive { Duration::ZERO } else { self.dead_for + dt };
         for feeder in 0..FEEDERS {
             self.take_trip(feeder, around, board);
-            self.hear(feeder, around);
+            self.hear(feeder, dead, around);
             self.supervise(feeder, dt, board);
         }
         self.until_next.step(dt);
@@ -164,14 +166,15 @@ impl Loads {
         }
     }
 
-    fn hear(&mut self, feeder: usize, around: Around<'_>) {
+    /// `dead` says that the section has no voltage, or had none a moment ago.
+    fn hear(&mut self, feeder: usize, dead: bool, around: Around<'_>) {
         let switch = &mut self.switches[feeder];
         let (was, is) = (switch.closed, around.heard.closed[feeder]);
         switch.closed = is;
         let opened_by_us = matches!(switch.driven, Some((Drive::Open, _)));
         if was && !is && !opened_by_us {
             switch.driven = None;
-            switch.fallen = !around.alive && around.heard.in_work[feeder] && !around.heard.tripped[feeder];
+            switch.fallen = dead && around.heard.in_work[feeder] && !around.heard.tripped[feeder];
         }
         if is {
             switch.fallen = false;

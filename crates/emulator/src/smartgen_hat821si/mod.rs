@@ -24,6 +24,7 @@ mod sync;
 mod timer;
 mod transfer;
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use busbar_modbus::ExceptionCode;
@@ -129,7 +130,8 @@ pub(crate) struct Hat821si {
     local: bool,
     masters: [bool; 2],
     remote_outputs: [bool; REMOTE_OUTPUTS],
-    alarms: usize,
+    /// Those of a moment ago: the horn sounds for each that is new.
+    alarms: BTreeSet<Alarm>,
     horn: Duration,
     /// How long each source has fed a section.
     source_supply: [Duration; 2],
@@ -169,7 +171,7 @@ impl Hat821si {
             local: false,
             masters: [true; 2],
             remote_outputs: [false; REMOTE_OUTPUTS],
-            alarms: 0,
+            alarms: BTreeSet::new(),
             horn: Duration::ZERO,
             source_supply,
             load_supply: source_supply.map(|own| SupplyTime::new(own, &mut random)),
@@ -259,7 +261,9 @@ impl Hat821si {
             masters: self.masters,
             available: self.available(),
             guests: self.guests(),
+            leaving: self.genset.leaving(),
             restores: self.limits.restores || self.inputs.has(Input::AutoRestore),
+            faultless: self.supervision.each_ref().map(Supervision::is_faultless),
             forced_open: self.protection.forces_open(&self.board),
             bars: self.bars(),
         }
@@ -294,8 +298,8 @@ impl Hat821si {
     fn press(&mut self, coil: u16) {
         match coil {
             ALARM_RESET => self.acknowledge(),
-            GENSET_START => self.genset.command(true),
-            GENSET_STOP => self.genset.command(false),
+            GENSET_START => self.genset.command(true, self.auto),
+            GENSET_STOP => self.genset.command(false, self.auto),
             TRANSFER_000 => self.transfer(Positions::OPEN),
             TRANSFER_101 => self.transfer(NORMAL),
             TRANSFER_110 => self.transfer(Positions::of(1, 1, 0)),
@@ -345,14 +349,16 @@ impl Hat821si {
 
     fn ask_for_gensets(&mut self, dt: Duration) {
         let guests = self.guests();
-        let serves = self.plant.feeds().iter().any(|by| by[0] && guests[0] || by[1] && guests[1]);
+        let on_genset = self.plant.sources.each_ref().map(Source::is_on_genset);
+        let feeds = [0, 1].map(|source: usize| self.plant.feeds().iter().any(|by| by[source]));
         let scene = genset::Scene {
             now: self.now(),
             auto: self.auto,
             masters: self.masters,
             available: self.available(),
-            on_genset: self.plant.sources.each_ref().map(Source::is_on_genset),
-            serves,
+            on_genset,
+            serves: (0..2).any(|source| feeds[source] && guests[source]),
+            feeds: [0, 1].map(|source: usize| feeds[source] && on_genset[source]),
             on_load_input: self.inputs.has(Input::StartOnLoad),
             off_load_input: self.inputs.has(Input::StartOffLoad),
             inhibited: self.inputs.has(Input::StartInhibit),
@@ -376,8 +382,8 @@ impl Hat821si {
             not_opened: self.stuck(Drive::Open),
             may_loop: self.limits.sync.loops() && faultless,
             in_step: self.synchroscope.is_in_step(&self.limits.sync, &self.limits.supervision),
-            // Elevators are not waited for where something has to open.
-            alive: self.plant.alive().contains(&true) && !wishes.forced_open && !wishes.bars.forbid_present(),
+            forced: if wishes.forced_open { Positions::ALL_CLOSED } else { wishes.bars.locked },
+            alive: self.plant.alive(),
         };
         match self.sequence.step(dt, view, &self.limits.transfer) {
             Some(Failure::Move(switch, drive)) => self.board.latch(Alarm::stuck(switch, drive)),
@@ -410,8 +416,9 @@ impl Hat821si {
     }
 
     fn sound(&mut self, dt: Duration) {
-        let alarms = self.board.count();
-        self.horn = if alarms > self.alarms { self.limits.horn } else { self.horn.saturating_sub(dt) };
+        let alarms = self.board.active();
+        let news = !alarms.is_subset(&self.alarms);
+        self.horn = if news { self.limits.horn } else { self.horn.saturating_sub(dt) };
         self.alarms = alarms;
     }
 

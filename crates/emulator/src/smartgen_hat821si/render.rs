@@ -174,7 +174,7 @@ fn inputs_and_outputs(unit: &Hat821si, bank: &mut Bank) {
         set([
             (0, first || second),
             (1, !unit.horn.is_zero()),
-            (2, unit.alarms > 0),
+            (2, !unit.alarms.is_empty()),
             (3, unit.auto),
             (4, first),
             (5, second),

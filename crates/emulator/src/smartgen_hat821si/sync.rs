@@ -7,8 +7,8 @@ use crate::settings::Settings;
 use super::plant::Meter;
 use super::supervision;
 
-/// Seconds that a switch takes to close, which the angle goes on turning.
-const AHEAD: f64 = 0.3;
+/// What a switch takes to close, while the angle goes on turning.
+pub(super) const OWN_TIME: Duration = Duration::from_millis(300);
 
 /// What is permitted, as it is set.
 #[derive(Clone, Debug, Default)]
@@ -76,7 +76,7 @@ impl Synchroscope {
     pub(super) fn is_in_step(&self, limits: &Limits, supervision: &supervision::Limits) -> bool {
         !limits.checks
             || self.between.is_some_and(|between| {
-                let then = half_turn(between.angle + AHEAD * between.turns);
+                let then = half_turn(between.angle + OWN_TIME.as_secs_f64() * between.turns);
                 between.volts <= limits.voltage * supervision.rated()
                     && between.hertz <= limits.frequency
                     && then.abs() <= limits.angle

@@ -19,6 +19,11 @@ impl Countdown {
         self.0.is_zero()
     }
 
+    /// What of it has not yet run.
+    pub(super) fn left(self) -> Duration {
+        self.0
+    }
+
     /// Whole seconds that a delay register shows: 1 until the last one is over.
     pub(super) fn seconds(self) -> u16 {
         u16::try_from(self.0.as_millis().div_ceil(1000)).unwrap_or(u16::MAX)

@@ -10,6 +10,7 @@ use crate::settings::Settings;
 
 use super::diagram::Edge;
 use super::switches::{Drive, Positions, Switch};
+use super::sync::OWN_TIME;
 use super::timer::Countdown;
 
 const ORDER: [Switch; 3] = [Switch::Qs1, Switch::Qs2, Switch::Qtie];
@@ -18,6 +19,8 @@ const ORDER: [Switch; 3] = [Switch::Qs1, Switch::Qs2, Switch::Qtie];
 #[derive(Clone, Debug, Default)]
 pub(super) struct Limits {
     closing: Duration,
+    /// For how long a switch that did not close is driven once more; zero: it is not.
+    again: Duration,
     opening: Duration,
     rest: Duration,
     elevator: Duration,
@@ -33,6 +36,7 @@ impl Limits {
     pub(super) fn of(settings: &Settings) -> Self {
         Self {
             closing: settings.seconds("closing_time"),
+            again: settings.seconds("closing_again_time"),
             opening: settings.seconds("opening_time"),
             rest: settings.seconds("transfer_rest"),
             elevator: settings.seconds("elevator_delay"),
@@ -100,7 +104,7 @@ impl Stage {
         Edge::new(Self::Closing, Self::Closing, "closed, and the next one has to"),
         Edge::new(Self::Closing, Self::WaitPosition, "closed, and the next one is not ready"),
         Edge::new(Self::Closing, Self::WaitSync, "closed, and the next one joins both sources"),
-        Edge::new(Self::Closing, Self::Ready, "another way is wanted"),
+        Edge::new(Self::Closing, Self::Ready, "another way is wanted, or not closed and to be closed again"),
         Edge::new(Self::Closing, Self::Still, "all done, or not closed in time"),
         Edge::new(Self::WaitSync, Self::SyncClosing, "in step"),
         Edge::new(
@@ -109,8 +113,12 @@ impl Stage {
             "another way is wanted, or not in step in time with the fallback set",
         ),
         Edge::new(Self::SyncClosing, Self::Parallel, "closed"),
-        Edge::new(Self::SyncClosing, Self::Ready, "another way is wanted"),
-        Edge::new(Self::SyncClosing, Self::Still, "not closed in time"),
+        Edge::new(
+            Self::SyncClosing,
+            Self::Ready,
+            "another way is wanted, or not closed and to be closed again",
+        ),
+        Edge::new(Self::SyncClosing, Self::Still, "not closed in time, or no longer in step"),
         Edge::new(Self::Parallel, Self::Opening, "loop time over"),
         Edge::new(Self::Parallel, Self::Still, "somebody else has opened one"),
     ];
@@ -147,8 +155,20 @@ pub(super) struct View {
     pub(super) may_loop: bool,
     /// They fit each other now.
     pub(super) in_step: bool,
-    /// A section has voltage.
-    pub(super) alive: bool,
+    /// Which switches have to be open, whatever else is wrong.
+    pub(super) forced: Positions,
+    /// Which sections have voltage.
+    pub(super) alive: [bool; 2],
+}
+
+impl View {
+    /// A living section loses its voltage when what has to open has opened.
+    fn interrupts(&self) -> bool {
+        let left = Positions::by(|switch| self.now.is_closed(switch) && self.target.is_closed(switch));
+        // Elevators are not waited for where something must be open.
+        let waits = !Switch::ALL.iter().any(|it| self.now.is_closed(*it) && self.forced.is_closed(*it));
+        waits && self.alive.iter().zip(left.feeds()).any(|(alive, by)| *alive && by == [false; 2])
+    }
 }
 
 /// What went wrong in a step.
@@ -167,6 +187,8 @@ pub(super) struct Sequence {
     elevator: bool,
     /// The switch that closed last.
     closed_last: Option<Switch>,
+    /// The switch that did not close and is driven once more.
+    again: Option<Switch>,
     /// This transfer goes on with a gap, for the sources did not come together.
     gives_up_loop: bool,
     /// It has been said that they do not.
@@ -182,6 +204,7 @@ impl Sequence {
             timer: Countdown::default(),
             elevator: false,
             closed_last: None,
+            again: None,
             gives_up_loop: false,
             sync_failed: false,
             #[cfg(test)]
@@ -220,12 +243,11 @@ impl Sequence {
             !now.is_closed(*switch) && target.is_closed(*switch) && !view.not_closed.is_closed(*switch)
         };
         if view.not_opened != Positions::OPEN {
-            // One does not open: nothing moves but what parts the sources again.
-            let last = self.closed_last.filter(|last| !view.not_opened.is_closed(*last));
-            return match (now == Positions::ALL_CLOSED, last) {
-                (true, Some(last)) => Activity::Opening(last),
-                _ => Activity::Still,
-            };
+            // One does not open: nothing moves but what must be open and what parts the sources again.
+            let can = |switch: &Switch| now.is_closed(*switch) && !view.not_opened.is_closed(*switch);
+            let must = ORDER.into_iter().find(|switch| can(switch) && view.forced.is_closed(*switch));
+            let parts = self.closed_last.filter(|last| now == Positions::ALL_CLOSED && can(last));
+            return must.or(parts).map_or(Activity::Still, Activity::Opening);
         }
         let open = ORDER.into_iter().find(opens);
         let close = ORDER.into_iter().find(closes);
@@ -249,7 +271,7 @@ impl Sequence {
     }
 
     fn begin(&mut self, next: Activity, view: View, limits: &Limits) {
-        let interrupts = matches!(next, Activity::Opening(_)) && view.alive && !self.elevator;
+        let interrupts = matches!(next, Activity::Opening(_)) && view.interrupts() && !self.elevator;
         if interrupts && !limits.elevator.is_zero() {
             self.elevator = true;
             self.enter(Activity::Elevator, limits);
@@ -292,15 +314,29 @@ impl Sequence {
 
     fn close(&mut self, switch: Switch, next: Activity, view: View, limits: &Limits) -> Option<Failure> {
         if view.now.is_closed(switch) {
-            self.closed_last = Some(switch);
+            self.has_closed(switch);
             self.go_on(next, limits);
         } else if !view.target.is_closed(switch) {
             self.enter(Activity::Ready, limits);
         } else if self.timer.is_over() {
-            self.enter(Activity::Still, limits);
-            return Some(Failure::Move(switch, Drive::Close));
+            return self.not_closed(switch, limits);
         }
         None
+    }
+
+    fn has_closed(&mut self, switch: Switch) {
+        (self.closed_last, self.again) = (Some(switch), None);
+    }
+
+    /// Once more, or it has failed.
+    fn not_closed(&mut self, switch: Switch, limits: &Limits) -> Option<Failure> {
+        if self.again.is_none() && !limits.again.is_zero() {
+            self.again = Some(switch);
+            self.enter(Activity::Ready, limits);
+            return None;
+        }
+        self.enter(Activity::Still, limits);
+        Some(Failure::Move(switch, Drive::Close))
     }
 
     fn wait_sync(&mut self, switch: Switch, next: Activity, view: View, limits: &Limits) -> Option<Failure> {
@@ -319,16 +355,21 @@ impl Sequence {
     }
 
     fn sync_close(&mut self, switch: Switch, view: View, limits: &Limits) -> Option<Failure> {
+        // One that is late must not close when the sources have passed each other.
+        let late = self.time_to_close(switch, limits).saturating_sub(self.timer.left()) >= OWN_TIME;
         if view.now.is_closed(switch) {
-            self.closed_last = Some(switch);
+            self.has_closed(switch);
             self.enter(Activity::Parallel, limits);
         } else if !view.target.is_closed(switch) {
             self.enter(Activity::Ready, limits);
-        } else if self.timer.is_over() {
-            self.enter(Activity::Still, limits);
-            return Some(Failure::Move(switch, Drive::Close));
+        } else if self.timer.is_over() || late && !view.in_step {
+            return self.not_closed(switch, limits);
         }
         None
+    }
+
+    fn time_to_close(&self, switch: Switch, limits: &Limits) -> Duration {
+        if self.again == Some(switch) { limits.again } else { limits.closing }
     }
 
     fn part(&mut self, next: Activity, view: View, limits: &Limits) {
@@ -351,12 +392,12 @@ impl Sequence {
             Activity::Rest => limits.rest,
             Activity::Opening(_) => limits.opening,
             Activity::WaitPosition(_) => limits.ready.unwrap_or_default(),
-            Activity::Closing(_) | Activity::SyncClosing(_) => limits.closing,
+            Activity::Closing(switch) | Activity::SyncClosing(switch) => self.time_to_close(switch, limits),
             Activity::WaitSync(_) => limits.sync,
             Activity::Parallel => limits.parallel,
         });
         if next == Activity::Still {
-            (self.elevator, self.gives_up_loop) = (false, false);
+            (self.elevator, self.gives_up_loop, self.again) = (false, false, None);
         }
         if !matches!(next, Activity::WaitSync(_)) {
             self.sync_failed = false;

@@ -1,6 +1,7 @@
 //! The imitated ACC1700: worked frames, wire rules, keys and the two procedures of its manual.
 
 mod alarms;
+mod filter;
 mod life;
 mod plant;
 mod settings;

@@ -8,6 +8,7 @@ mod display;
 mod g59;
 mod meters;
 mod parallel;
+mod settings;
 mod share;
 
 use busbar_emulator::Config;

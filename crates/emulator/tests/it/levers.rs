@@ -23,6 +23,7 @@ pub(crate) enum Event {
     Alarm(usize, bool),
 }
 
+/// What happens, and for how many tenths of a second it then goes on.
 pub(crate) fn events() -> impl Strategy<Value = Vec<(Event, u64)>> {
     let event = prop_oneof![
         5 => (any::<usize>(), 0.0..1.0).prop_map(|(number, part)| Event::Lever(number, part)),

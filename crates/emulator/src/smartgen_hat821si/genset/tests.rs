@@ -15,6 +15,7 @@ struct Yard {
     runs: [bool; 2],
     auto: bool,
     serves: bool,
+    feeds: [bool; 2],
     inputs: [bool; 3],
 }
 
@@ -33,6 +34,7 @@ impl Yard {
             runs: [false; 2],
             auto: true,
             serves: false,
+            feeds: [false; 2],
             inputs: [false; 3],
         }
     }
@@ -49,6 +51,7 @@ impl Yard {
                 available: [0, 1].map(|source| self.available[source] || self.runs[source]),
                 on_genset: [0, 1].map(|source| !self.available[source] && self.runs[source]),
                 serves: self.serves,
+                feeds: self.feeds,
                 on_load_input,
                 off_load_input,
                 inhibited,
@@ -67,7 +70,7 @@ impl Yard {
 fn start_and_stop_take_their_delays() {
     let mut yard = Yard::new(&[]);
     let mut walk = |start, seconds| {
-        yard.genset.command(start);
+        yard.genset.command(start, true);
         let (status, delay, _) = yard.walk(seconds);
         (status, delay, yard.genset.start_output())
     };
@@ -87,7 +90,7 @@ fn without_mains_it_runs_until_they_are_back() {
     yard.available = [false, false];
     assert_eq!(yard.walk(10), (8, 0, [false, true]));
     assert!(yard.genset.causes().mains_abnormal && yard.genset.choice_bit().is_none());
-    yard.genset.command(false);
+    yard.genset.command(false, true);
     assert_eq!(yard.walk(5).0, 8, "a command does not end that");
     yard.available = [false, true];
     assert_eq!(yard.walk(10).0, 9, "its own mains are back");
@@ -104,6 +107,48 @@ fn without_mains_it_runs_until_they_are_back() {
     let mut nothing = Yard::new(&[("gensets", "0")]);
     nothing.available = [false, false];
     assert_eq!(nothing.walk(30), (9, 0, [false; 2]));
+    assert_eq!(nothing.genset.causes(), Causes::default());
+}
+
+#[test]
+fn in_manual_mode_what_runs_goes_on_until_somebody_stops_it() {
+    for stopped in [false, true] {
+        let mut yard = Yard::new(&[]);
+        yard.available = [false, false];
+        yard.walk(10);
+        (yard.auto, yard.inputs) = (false, [false, false, true]);
+        assert_eq!(yard.walk(100).0, 8);
+        if stopped {
+            yard.genset.command(false, false);
+        } else {
+            yard.available = [true, false];
+        }
+        assert_eq!(yard.walk(10).0, 9, "{stopped}");
+    }
+    let mut yard = Yard::new(&[]);
+    yard.available = [false, false];
+    yard.walk(2);
+    yard.auto = false;
+    assert_eq!(yard.walk(100).0, 9, "it had not been started yet");
+}
+
+#[test]
+fn a_start_that_cannot_be_obeyed_is_forgotten() {
+    let mut yard = Yard::new(&[]);
+    yard.inputs = [false, false, true];
+    yard.walk(1);
+    yard.genset.command(true, true);
+    yard.walk(5);
+    yard.inputs = [false; 3];
+    assert_eq!(yard.walk(10).0, 9, "inhibited");
+
+    yard.healthy = [false; 2];
+    yard.genset.command(true, true);
+    yard.walk(60);
+    assert!(yard.board.has(Alarm::genset(1)));
+    yard.healthy = [true; 2];
+    yard.board.reset();
+    assert_eq!(yard.walk(20).0, 9, "a reset starts nothing");
 }
 
 #[test]
@@ -155,12 +200,12 @@ fn the_calendar_starts_it_and_holds_it_off() {
 fn a_set_that_does_not_run_is_told_of() {
     let mut yard = Yard::new(&[("genset_supply_time", "20")]);
     yard.healthy[1] = false;
-    yard.genset.command(true);
+    yard.available = [false; 2];
     yard.walk(20);
     assert!(!yard.board.has(Alarm::genset(1)));
     yard.walk(10);
     assert!(yard.board.has(Alarm::genset(1)));
-    assert_eq!(yard.walk(1).2, [false; 2], "it is not asked again");
+    assert_eq!(yard.walk(1), (9, 0, [false; 2]), "it is not asked again");
     yard.board.reset();
     yard.healthy[1] = true;
     assert_eq!(yard.walk(5).2, [false, true]);
@@ -184,13 +229,17 @@ fn of_two_sets_one_is_chosen() {
     yard.available = [false, false];
     assert_eq!(yard.walk(10).2, [false, true]);
     assert_eq!(yard.genset.choice_bit(), Some(0));
+    yard.feeds = [false, true];
     yard.walk(54);
-    assert_eq!(yard.walk(2).2, [true, false], "its turn was a minute");
+    assert_eq!(yard.walk(9).2, [true, true], "its turn was a minute, and it still feeds somebody");
+    assert_eq!(yard.genset.leaving(), [false, true]);
+    yard.feeds = [true, false];
+    assert_eq!(yard.walk(1).2, [true, false]);
 
     let mut yard = two("2");
-    yard.genset.command(true);
+    yard.genset.command(true, true);
     yard.walk(60);
-    yard.genset.command(false);
+    yard.genset.command(false, true);
     yard.walk(10);
     yard.available = [false, false];
     assert_eq!(yard.walk(10).2, [false, true], "the first one has run");

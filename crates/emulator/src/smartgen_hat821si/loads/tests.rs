@@ -82,6 +82,15 @@ fn one_without_priority_stays_open() {
 }
 
 #[test]
+fn those_that_fall_as_the_voltage_comes_back_come_back_too() {
+    let mut side = Side::new(&[]);
+    side.run(9, false, true);
+    side.heard.closed = [false; FEEDERS];
+    side.run(200, true, true);
+    assert_eq!(side.closed(), 12);
+}
+
+#[test]
 fn in_manual_the_window_asks_first() {
     let mut side = Side::new(&[]);
     side.run(20, false, false);

@@ -7,6 +7,8 @@ use super::super::switches::Drive;
 pub(in super::super) enum Condition {
     Normal,
     WillNotClose,
+    /// Of its closing pulses the first one does nothing.
+    ClosesAtSecond,
     WillNotOpen,
     /// Its release opens it and keeps it open.
     Trips,
@@ -23,17 +25,33 @@ pub(in super::super) struct Mechanism {
     /// Seconds from its output to its position.
     seconds: f64,
     moving: f64,
+    /// Closing pulses since it was closed last, and whether one lasts.
+    pulses: u32,
+    pulse: bool,
 }
 
 impl Mechanism {
     pub(super) fn new(closed: bool, closings: u32, seconds: f64) -> Self {
-        Self { closed, closings, condition: Condition::Normal, in_work: true, seconds, moving: 0.0 }
+        Self {
+            closed,
+            closings,
+            condition: Condition::Normal,
+            in_work: true,
+            seconds,
+            moving: 0.0,
+            pulses: 0,
+            pulse: false,
+        }
     }
 
     pub(super) fn step(&mut self, dt: f64, drive: Option<Drive>) {
         let wanted = drive.map_or(self.closed, Drive::closes);
+        let pulse = drive == Some(Drive::Close);
+        self.pulses = self.pulses.saturating_add(u32::from(pulse && !self.pulse));
+        self.pulse = pulse;
         let stuck = match self.condition {
             Condition::Normal => false,
+            Condition::ClosesAtSecond => wanted && self.pulses < 2,
             Condition::WillNotClose | Condition::Trips => wanted,
             Condition::WillNotOpen => !wanted,
         };
@@ -46,29 +64,32 @@ impl Mechanism {
         if self.moving > self.seconds - dt / 2.0 {
             self.closed = wanted;
             self.closings = self.closings.saturating_add(u32::from(wanted));
-            self.moving = 0.0;
+            (self.moving, self.pulses) = (0.0, 0);
         }
     }
 
-    /// Opens at once: a release, or the interlock of its drawer.
+    /// Its release opens it at once, unless it jams.
     pub(super) fn release(&mut self) {
-        self.closed = false;
+        self.closed &= self.condition == Condition::WillNotOpen;
         self.moving = 0.0;
     }
 
     pub(in super::super) fn set_condition(&mut self, condition: Condition) {
         self.condition = condition;
+        self.pulses = 0;
         if condition == Condition::Trips {
             self.release();
         }
     }
 
-    /// Draws it out of the work position or puts it back: closed, it opens first.
+    /// Draws it out of the work position or puts it back: closed, it opens first. Its interlock holds one that does not.
     pub(in super::super) fn set_in_work(&mut self, in_work: bool) {
         if in_work != self.in_work {
             self.release();
         }
-        self.in_work = in_work;
+        if !self.closed {
+            self.in_work = in_work;
+        }
     }
 
     pub(in super::super) fn condition(&self) -> Condition {
@@ -122,9 +143,19 @@ mod tests {
         switch.set_condition(Condition::WillNotOpen);
         assert_eq!(drive(&mut switch, 20, Drive::Close), (true, 8));
         assert_eq!(drive(&mut switch, 20, Drive::Open), (true, 8));
+        switch.release();
+        switch.set_in_work(false);
+        assert!(switch.conducts(), "neither by its release nor by its drawer");
         switch.set_condition(Condition::Trips);
         assert!(!switch.is_closed());
         assert_eq!(drive(&mut switch, 20, Drive::Close), (false, 8));
+        switch.set_condition(Condition::ClosesAtSecond);
+        switch.step(DT, None);
+        assert_eq!(drive(&mut switch, 20, Drive::Close), (false, 8));
+        switch.step(DT, None);
+        assert_eq!(drive(&mut switch, 20, Drive::Close), (true, 9));
+        drive(&mut switch, 3, Drive::Open);
+        assert_eq!(drive(&mut switch, 20, Drive::Close), (false, 9), "and again");
     }
 
     #[test]

@@ -170,17 +170,24 @@ impl Plant {
                 self.operate(Switch::Qtie);
             }
         }
-        if self.is_parallel() && self.surges() {
+        if self.is_surging() {
             let closed_now = Switch::ALL.into_iter().find(|switch| !before.is_closed(*switch));
-            self.operate(closed_now.unwrap_or(Switch::Qtie));
+            // Where that one jams, another one parts them.
+            for switch in closed_now.into_iter().chain([Switch::Qtie, Switch::Qs1, Switch::Qs2]) {
+                if self.is_parallel() {
+                    self.operate(switch);
+                }
+            }
         }
     }
 
-    fn surges(&self) -> bool {
+    /// Sources are joined that are too far apart.
+    pub(super) fn is_surging(&self) -> bool {
         let [first, second] = &self.sources;
         let volts = (first.average_part() - second.average_part()).abs();
         let hertz = (first.frequency() - second.frequency()).abs();
-        self.angle_between().abs() > SURGE.0 || volts > SURGE.1 || hertz > SURGE.2
+        let apart = self.angle_between().abs() > SURGE.0 || volts > SURGE.1 || hertz > SURGE.2;
+        self.is_parallel() && apart
     }
 
     /// Degrees that source 1 leads source 2, -180 to 180; half a turn where their phases follow differently.
@@ -214,15 +221,17 @@ impl Plant {
     /// Lets `dt` seconds of electricity flow into the load switches that are closed.
     fn carry(&mut self, dt: f64, outputs: &Outputs) {
         self.grid.step(dt, &mut self.random);
-        let parallel = self.is_parallel();
+        let (parallel, feeds) = (self.is_parallel(), self.feeds());
+        let shorted = self.sections.each_ref().map(|section| section.short_circuit);
         let hertz = self.sources.each_ref().map(Source::frequency);
         for (index, source) in self.sources.iter_mut().enumerate() {
             let engine = &mut self.engines[index];
-            engine.step(dt, outputs.start[index]);
+            engine.step(dt, outputs.start[index], source.holds());
             let around = Surroundings {
                 genset: engine.has_voltage(),
                 on_load: outputs.on_load,
                 tied: parallel.then_some(hertz[1 - index]),
+                shorted: (0..2).any(|section| shorted[section] && feeds[section][index]),
             };
             source.step(dt, around, &self.grid, &mut self.random);
         }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use crate::plant::{Energy, Feed, Supply};
 use crate::random::{Drift, Random, approach};
 
+use super::engine::holds;
 use super::section::Demand;
 use super::{Grid, PHASE_VOLTAGE, RATED_FREQUENCY, turned};
 
@@ -13,6 +14,8 @@ use super::{Grid, PHASE_VOLTAGE, RATED_FREQUENCY, turned};
 const CHANGEOVER: f64 = 0.5;
 /// A phase below this part of its voltage has neither angle nor frequency.
 const PRESENT: f64 = 0.1;
+/// Seconds in which a genset yields to what is asked of it.
+const INERTIA: f64 = 0.8;
 /// Seconds of a flicker, and how much of them the voltage is low.
 const FLICKER: (f64, f64) = (2.0, 0.6);
 
@@ -78,6 +81,12 @@ pub(in super::super) struct Source {
     pub(super) feed: Feed,
     on_genset: bool,
     changing: f64,
+    /// A short circuit hangs on it.
+    shorted: bool,
+    /// kW that its sections would take at full voltage.
+    asked: f64,
+    /// Part of its speed and voltage that its genset holds under that.
+    held: f64,
     time: f64,
     /// Degrees of phase A against a clock of exactly 50 Hz.
     angle: f64,
@@ -100,6 +109,8 @@ pub(super) struct Surroundings {
     pub(super) on_load: bool,
     /// Hz of the source that it runs in parallel with.
     pub(super) tied: Option<f64>,
+    /// A short circuit that no switch has cleared hangs on it.
+    pub(super) shorted: bool,
 }
 
 impl Source {
@@ -114,6 +125,9 @@ impl Source {
             feed: Feed::default(),
             on_genset: false,
             changing: 0.0,
+            shorted: false,
+            asked: 0.0,
+            held: 1.0,
             time: 0.0,
             angle: 0.0,
             level: Drift::new(25.0, 180.0, random),
@@ -135,6 +149,15 @@ impl Source {
     /// Its terminals hang on the genset.
     pub(in super::super) fn is_on_genset(&self) -> bool {
         self.on_genset
+    }
+
+    /// Part of its speed that the genset holds which it hangs on.
+    pub(super) fn holds(&self) -> f64 {
+        match (self.on_genset, self.shorted) {
+            (true, true) => 0.0,
+            (true, false) => self.held,
+            (false, _) => 1.0,
+        }
     }
 
     /// Mean of the phase voltages, as a part of the rated one.
@@ -223,10 +246,13 @@ impl Source {
         let on_genset = around.genset && (around.on_load || mains_fail);
         if on_genset != self.on_genset {
             self.on_genset = on_genset;
-            self.changing = CHANGEOVER;
+            (self.changing, self.held) = (CHANGEOVER, 1.0);
         }
         self.changing = (self.changing - dt).max(0.0);
-        let remains = match (self.changing > 0.0, on_genset) {
+        self.shorted = around.shorted;
+        let alone = on_genset && around.tied.is_none();
+        approach(&mut self.held, if alone { holds(self.asked) } else { 1.0 }, INERTIA, dt);
+        let remains = match (self.changing > 0.0 || self.shorted, on_genset) {
             (true, _) => [0.0; 3],
             (false, true) => [1.0; 3],
             (false, false) if grid.failed => [0.0; 3],
@@ -242,7 +268,10 @@ impl Source {
         // The sources sag a little under what they carried the moment before.
         let sag = 0.012 * self.feed.total_active();
         let own = PHASE_VOLTAGE + 40.0 + self.level.step(dt, random);
-        let level = self.set_voltage.filter(|_| !on_genset).unwrap_or(own - sag);
+        let level = match self.set_voltage {
+            Some(volts) if !on_genset => volts,
+            _ => (own - sag) * self.held,
+        };
         for (phase, part) in self.parts.into_iter().enumerate() {
             self.feed.voltage[phase] = part * (level + self.phases[phase].step(dt, random)).max(0.0);
         }
@@ -256,7 +285,10 @@ impl Source {
         let (swing, governor) = (self.swing.step(dt, random), self.governor.step(dt, random));
         let own = match (self.on_genset, self.set_frequency) {
             // A genset gives way under load, the grid does not.
-            (true, _) => Some(RATED_FREQUENCY + 0.25 - 0.0002 * self.feed.total_active() + governor),
+            (true, _) => {
+                let droop = 0.0002 * self.feed.total_active();
+                Some((RATED_FREQUENCY + 0.25 - droop + governor) * self.held)
+            }
             (false, Some(hertz)) => Some(hertz),
             (false, None) => None,
         };
@@ -287,6 +319,7 @@ impl Source {
     /// Takes its share of the sections, kW and kvar of each phase at full voltage. Whole kW and kvar: totals are then
     /// the exact sums of what is shown.
     pub(super) fn load(&mut self, dt: f64, share: &Demand) {
+        self.asked = share.active.iter().sum();
         for phase in 0..3 {
             let volts = self.feed.voltage[phase];
             let part = (volts / PHASE_VOLTAGE).powi(2);

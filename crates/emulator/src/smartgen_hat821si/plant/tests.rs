@@ -79,11 +79,51 @@ fn the_genset_stands_in_for_ill_mains_of_its_source_only() {
 }
 
 #[test]
-fn a_genset_gives_way_under_load() {
+fn a_genset_gives_way_under_load_sags_under_too_much_and_stops_under_far_too_much() {
+    let loaded = Outputs { on_load: true, ..started() };
     let mut plant = Plant::new(3, Positions::of(0, 1, 1));
-    pass(&mut plant, 10.0, &Outputs { on_load: true, ..started() });
-    assert!(plant.sources[1].meter().power > 3500.0);
+    plant.sections.iter_mut().for_each(|section| section.load = Some(1600.0));
+    pass(&mut plant, 10.0, &loaded);
+    assert!(plant.sources[1].meter().power > 3000.0);
     assert!((49.0..49.9).contains(&plant.sources[1].frequency()), "{}", plant.sources[1].frequency());
+
+    plant.sections.iter_mut().for_each(|section| section.load = Some(2200.0));
+    pass(&mut plant, 30.0, &loaded);
+    let (power, hertz) = (plant.sources[1].meter().power, plant.sources[1].frequency());
+    assert!((3700.0..4000.0).contains(&power) && (45.5..47.5).contains(&hertz), "{power} {hertz}");
+    assert!((0.9..0.96).contains(&plant.sources[1].average_part()));
+
+    plant.sections.iter_mut().for_each(|section| section.load = Some(3500.0));
+    pass(&mut plant, 4.0, &loaded);
+    assert!(plant.sources[1].is_on_genset() && plant.sources[1].frequency() < 40.0);
+    pass(&mut plant, 3.0, &loaded);
+    assert!(!plant.engines[1].has_voltage() && !plant.sources[1].is_on_genset());
+    pass(&mut plant, 60.0, &loaded);
+    assert!(!plant.engines[1].has_voltage(), "it stays at rest");
+}
+
+#[test]
+fn a_short_circuit_that_no_switch_clears_pulls_its_source_down() {
+    let mut plant = Plant::new(7, Positions::of(1, 1, 0));
+    plant.switches.iter_mut().for_each(|switch| switch.set_condition(Condition::WillNotOpen));
+    plant.sections[1].short_circuit = true;
+    rest(&mut plant, 1.0);
+    assert_eq!((plant.positions().digits(), plant.relays), ([1, 1, 0], [false, true, false]));
+    assert_eq!((plant.sources[0].meter().feed.voltage, plant.alive()), ([0.0; 3], [false; 2]));
+    assert!(plant.sources[1].average_part() > 0.9);
+    plant.sections[1].short_circuit = false;
+    rest(&mut plant, 1.0);
+    assert_eq!(plant.alive(), [true, true]);
+}
+
+#[test]
+fn where_one_switch_jams_another_one_parts_sources_out_of_step() {
+    let mut plant = Plant::new(6, Positions::of(1, 0, 1));
+    plant.sources[1].shift = 90.0;
+    plant.switches[1].set_condition(Condition::WillNotOpen);
+    let close = Outputs { switches: [None, Some(Drive::Close), None], ..Outputs::default() };
+    pass(&mut plant, 0.3, &close);
+    assert_eq!((plant.positions().digits(), plant.relays), ([0, 1, 1], [true, true, false]));
 }
 
 #[test]

@@ -21,7 +21,8 @@ fn view(now: Positions, target: Positions) -> View {
         not_opened: Positions::OPEN,
         may_loop: false,
         in_step: true,
-        alive: true,
+        forced: Positions::OPEN,
+        alive: now.feeds().map(|by| by.contains(&true)),
     }
 }
 
@@ -112,9 +113,9 @@ fn elevators_stop_before_a_living_section_is_interrupted() {
     let back = View { target: now.now, ..now };
     run(&mut sequence, 2, back, &limits);
     assert!(sequence.is_still() && !sequence.holds_elevators());
-    // Nothing that lives is interrupted.
+    // Nothing that lives is interrupted: section 1 has lost its source.
     let mut sequence = Sequence::new();
-    let dead = View { alive: false, ..now };
+    let dead = View { alive: [false, true], ..now };
     run(&mut sequence, 2, dead, &limits);
     assert_eq!(sequence.drives()[0], Some(Drive::Open));
 }
@@ -215,6 +216,56 @@ fn sources_that_do_not_come_together_are_told_of_and_waited_for() {
 }
 
 #[test]
+fn what_must_be_open_opens_though_another_one_does_not() {
+    let limits = limits(&[]);
+    let joined = Positions::of(1, 0, 1);
+    let stuck = View { not_opened: Positions::of(1, 0, 0), ..view(joined, Positions::OPEN) };
+    let mut sequence = Sequence::new();
+    run(&mut sequence, 100, stuck, &limits);
+    assert!(sequence.is_still(), "nobody has to be open");
+    run(&mut sequence, 2, View { forced: EVERYTHING, ..stuck }, &limits);
+    assert_eq!(sequence.drives(), [None, None, Some(Drive::Open)]);
+}
+
+#[test]
+fn a_switch_that_does_not_close_is_driven_once_more_where_that_is_set() {
+    let limits = limits(&[("closing_again_time", "2")]);
+    let now = view(Positions::of(0, 0, 1), Positions::of(0, 1, 1));
+    let mut sequence = Sequence::new();
+    let mut pulses = vec![];
+    for step in 0..100 {
+        let failure = sequence.step(TENTH, now, &limits);
+        pulses.push(sequence.drives()[1].is_some());
+        if let Some(failure) = failure {
+            assert_eq!((failure, step), (Failure::Move(Switch::Qtie, Drive::Close), 72));
+            break;
+        }
+    }
+    pulses.dedup();
+    assert_eq!(pulses, [false, true, false, true, false]);
+}
+
+#[test]
+fn a_switch_that_is_late_does_not_close_when_the_sources_have_passed() {
+    let limits_with = limits(&[]);
+    let passing = View { may_loop: true, ..view(Positions::of(1, 0, 1), Positions::of(1, 1, 0)) };
+    for (again, failure) in [("0", Some(Failure::Move(Switch::Qtie, Drive::Close))), ("5", None)] {
+        let limits_again = limits(&[("closing_again_time", again)]);
+        let mut sequence = Sequence::new();
+        run(&mut sequence, 3, passing, &limits_again);
+        assert_eq!(sequence.status(passing.now), 9);
+        let past = View { in_step: false, ..passing };
+        run(&mut sequence, 2, past, &limits_again);
+        assert_eq!(sequence.drives()[1], Some(Drive::Close), "it moves");
+        assert_eq!(sequence.step(TENTH, past, &limits_again), failure);
+        assert_eq!(sequence.drives(), [None; 3]);
+    }
+    let mut sequence = Sequence::new();
+    run(&mut sequence, 30, passing, &limits_with);
+    assert_eq!(sequence.status(passing.now), 9, "in step it may take its time");
+}
+
+#[test]
 fn sources_that_stay_joined_are_parted_by_the_switch_that_joined_them() {
     let to = Positions::of(0, 1, 1);
     let limits = limits(&[]);
@@ -306,7 +357,7 @@ fn the_ways_are_those_that_are_walked() {
             }
             if luck.with(0.02) {
                 (view.not_closed, view.not_opened) = (Positions::OPEN, Positions::OPEN);
-                view.alive = luck.with(0.9);
+                view.alive = [luck.with(0.9); 2];
             }
             // Somebody opens one by hand.
             if luck.with(0.01) {

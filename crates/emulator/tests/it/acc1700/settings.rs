@@ -153,7 +153,7 @@ fn thresholds_are_those_that_are_set() {
     for (setting, value, expected) in [
         ("overspeed_warning", "1400", "overspeed_warning"),
         ("overspeed_shutdown", "1400", "overspeed_shutdown"),
-        ("underspeed_shutdown", "1000", "underspeed_shutdown"),
+        ("underspeed_shutdown", "1600", "underspeed_shutdown"),
         ("low_oil_pressure_warning", "450", "low_engine_oil_pressure_warning"),
         ("low_oil_pressure_shutdown", "450", "low_engine_oil_pressure_shutdown"),
         ("charging_failure_warning_voltage", "29", "charging_failure_warning"),

@@ -32,6 +32,72 @@ async fn controllers_say_what_they_are() {
 }
 
 #[tokio::test]
+async fn everything_goes_back_to_normal_at_once() {
+    let bench = Bench::new().await;
+    bench.step(1.0).await;
+    let back = async |lever: &str| {
+        let levers = bench.get("d/levers").await;
+        let levers = levers.as_array().unwrap();
+        levers.iter().find(|each| each["id"] == lever).unwrap()["back"].clone()
+    };
+    let level = bench.get("d/levers").await.as_array().unwrap()[16].clone();
+    assert_eq!((&level["id"], &level["back"]), (&json!("tank"), &json!(null)));
+    assert_eq!(back("load").await, json!(null));
+    for (path, body) in [
+        ("d/levers/mains", json!({ "position": "failed" })),
+        ("d/levers/load", json!({ "position": 60 })),
+        ("d/levers/tank", json!({ "position": 0 })),
+        ("d/levers/tank", json!({ "position": 100 })),
+        ("d/pins/battery_voltage", json!({ "value": 12 })),
+        ("d/alarms/coolant_temperature_high", json!({})),
+    ] {
+        bench.put(path, body).await.json();
+    }
+    assert_eq!((back("mains").await, back("load").await), (json!("normal"), json!("varies")));
+    assert_eq!(back("tank").await, level["position"], "what it was before the first pull");
+    let normal = bench.put("d/normal", json!({})).await.json();
+    assert_eq!((&normal["injected"], &normal["pinned"]), (&json!([]), &json!([])));
+    let levers = normal["levers"].as_array().unwrap();
+    assert!(levers.iter().all(|lever| lever["back"].is_null()), "{levers:?}");
+    let tank = levers.iter().find(|lever| lever["id"] == "tank").unwrap();
+    assert_eq!(tank["position"], level["position"]);
+
+    bench.put("d/levers/tank", json!({ "position": 0 })).await.json();
+    bench.put("d/levers/tank", json!({ "position": level["position"] })).await.json();
+    assert_eq!(back("tank").await, json!(null), "put back by hand");
+}
+
+#[tokio::test]
+async fn what_happened_lately_is_told_and_what_is_active() {
+    let bench = Bench::new().await;
+    bench.step(1.0).await;
+    bench.put("d/levers/mains", json!({ "position": "failed" })).await.json();
+    bench.put("d/alarms/warning_alarms.low_fuel_level", json!({})).await.json();
+    bench.step(60.0).await;
+    bench.put("d/normal", json!({})).await.json();
+    let told = bench.get("d/events").await;
+    let told: Vec<_> = told.as_array().unwrap().iter().map(|event| event["text"].as_str().unwrap()).collect();
+    assert_eq!(told[0], "All back to normal", "the newest first");
+    let place = |text: &str| {
+        let place = told.iter().rposition(|told| *told == text);
+        place.unwrap_or_else(|| panic!("{text} is not told: {told:?}"))
+    };
+    assert!(place("Mains: failed") > place("mains.failed"), "{told:?}");
+    assert!(place("mains.failed") > place("breaker.genset.closed"), "{told:?}");
+    place("warning alarm injected: Low fuel level");
+    place("warning alarm: Low fuel level");
+    let active = bench.get("d").await["active"].clone();
+    let fuel = active.as_array().unwrap().iter().find(|alarm| alarm["id"] == "warning_alarms.low_fuel_level");
+    assert!(fuel.is_some(), "it is let go from the next step on: {active}");
+    assert_eq!(
+        bench.get("dkg/events").await.as_array().unwrap().len(),
+        0,
+        "nothing happened to the other one"
+    );
+    assert_eq!(bench.get("d").await["scenario"], json!(null));
+}
+
+#[tokio::test]
 async fn a_paused_clock_stands_still_and_is_stepped() {
     let bench = Bench::new().await;
     assert_eq!(bench.put("d/clock", json!({ "paused": true, "speed": 60 })).await.json()["paused"], true);

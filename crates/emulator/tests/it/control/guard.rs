@@ -85,6 +85,16 @@ async fn a_page_elsewhere_cannot_rebind_its_name() {
 }
 
 #[tokio::test]
+async fn nobody_waits_for_a_body_that_is_not_taken() {
+    let bench = Bench::new().await;
+    let request = Request::builder().method(Method::PUT).uri(at("d/clock"));
+    let request = request.header(header::CONTENT_TYPE, "application/json");
+    let request = request.header(header::CONTENT_LENGTH, "99999999999");
+    let told = bench.send(request.body(Body::from("{}")).unwrap()).await.problem(413);
+    assert!(told.contains("8192 bytes"), "{told}");
+}
+
+#[tokio::test]
 async fn the_page_loads_nothing_from_elsewhere() {
     let bench = Bench::new().await;
     let page = bench.ask(Method::GET, "/", None).await;

@@ -118,6 +118,10 @@ async fn bodies_that_are_none_are_refused() {
         let problem = send("PUT", "dkg/levers/mains", json, body.to_owned()).await.problem(400);
         assert!(problem.starts_with("the body is not what is needed: "), "{body}: {problem}");
     }
+    let list = send("PUT", "dkg/clock", json, "[60, true]".to_owned()).await.problem(400);
+    assert!(list.contains("an object is needed"), "{list}");
+    let text = send("PUT", "dkg/clock", json, "{\"speed\":\"fast\"}".to_owned()).await.problem(400);
+    assert!(text.contains("expected a number"), "{text}");
     for body in ["{\"speed\":null}", "{\"paused\":1}", "{\"step\":1}", "{\"speed\":1,\"speed\":2}"] {
         send("PUT", "dkg/clock", json, body.to_owned()).await.problem(400);
     }

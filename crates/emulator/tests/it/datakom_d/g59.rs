@@ -1,5 +1,7 @@
 //! Mains that are lost, or must be left, while genset and mains are side by side.
 
+use busbar_emulator::Config;
+
 use super::{LOAD_DUMP, WARNING, alarms, closed, load, pull, set, until};
 use crate::site::{Site, TENTH};
 
@@ -69,6 +71,33 @@ fn what_flows_into_mains_that_are_to_get_nothing_is_found_out() {
     let mut site = beside("20", &[("g59_reverse_power", "3")]);
     site.pass_seconds(60);
     assert_eq!((site.code("operation_status"), alarms(&site, WARNING)), (15, vec![]));
+}
+
+#[test]
+fn an_export_that_ends_slowly_is_no_reverse_power() {
+    let mut site = beside("0", &[("load_ramp", "4")]);
+    pull(&mut site, "remote_start", "off");
+    assert_eq!(site.walk_to(0), [15, 18, 21, 22, 23, 25, 0]);
+    assert!(alarms(&site, WARNING).is_empty());
+}
+
+#[test]
+fn a_d_700_that_exports_by_hand_keeps_the_load_of_mains_that_fail() {
+    let mut site = Site::new(&Config {
+        model: Some("D-700".to_owned()),
+        pins: [("power_export", "1")].map(|(id, value)| (id.to_owned(), value.to_owned())).to_vec(),
+        ..Config::default()
+    });
+    pull(&mut site, "remote_start", "on");
+    site.walk_to(15);
+    site.press(crate::site::RUN);
+    pull(&mut site, "remote_start", "off");
+    site.pass_seconds(20);
+    assert_eq!((site.code("unit_mode"), site.code("operation_status")), (2, 15));
+    pull(&mut site, "mains", "failed");
+    islands(&mut site);
+    pull(&mut site, "mains", "normal");
+    assert_eq!(site.walk_to(15), [13, 17, 15]);
 }
 
 #[test]

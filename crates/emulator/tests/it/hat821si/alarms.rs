@@ -345,4 +345,13 @@ fn the_horn_sounds_for_as_long_as_it_is_set_to() {
     assert!(bit(&site, "common_status", 6) && bit(&site, "aux_outputs", 1));
     site.pass_seconds(5);
     assert!(!bit(&site, "common_status", 6) && bit(&site, "aux_outputs", 2));
+    // One goes as another one comes.
+    site.device.set("forced_open_fault", "0").unwrap();
+    pull(&mut site, "module.input_1", "silent");
+    site.pass_seconds(12);
+    assert!(has(&site, "input_module_1_comm_warning") && !bit(&site, "common_status", 6));
+    pull(&mut site, "module.input_1", "normal");
+    pull(&mut site, "input.forced_open", "on");
+    site.pass_seconds(1);
+    assert!(bit(&site, "common_status", 6));
 }

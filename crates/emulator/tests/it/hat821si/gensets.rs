@@ -125,7 +125,11 @@ fn of_two_sets_one_is_started_and_the_other_stands_in() {
     site.pass_seconds(60);
     assert!(bit(&site, "start_and_inhibits", 0));
     assert_eq!(positions(&site), [0, 1, 1]);
-    let tenths = until(&mut site, 2000, "the other one", |site| positions(site) == [1, 1, 0]);
+    let fed = |site: &Site| positions(site) != [0, 1, 1] || site.number("s2_a_voltage") > 5000.0;
+    let tenths = until(&mut site, 2000, "the other one", |site| {
+        assert!(fed(site), "the first one goes on until the other one has its load");
+        positions(site) == [1, 1, 0]
+    });
     assert!(tenths > 600, "{tenths}");
     until(&mut site, 3000, "and back", |site| positions(site) == [0, 1, 1]);
 
@@ -133,6 +137,32 @@ fn of_two_sets_one_is_started_and_the_other_stands_in() {
     fail_both(&mut site);
     site.pass_seconds(60);
     assert!(bit(&site, "start_and_inhibits", 1));
+}
+
+#[test]
+fn manual_mode_stops_no_genset_that_somebody_needs() {
+    let mut site = quiet();
+    fail_both(&mut site);
+    site.pass_seconds(60);
+    send(&mut site, 15004, super::OFF);
+    pull(&mut site, "input.start_inhibit", "on");
+    site.pass_seconds(60);
+    assert!(site.number("s2_a_voltage") > 5000.0 && bit(&site, "switches", 14));
+    set(&mut site, "genset_stop");
+    site.pass_seconds(10);
+    assert_eq!((site.number("s2_a_voltage"), site.code("genset_status")), (0.0, 9));
+}
+
+#[test]
+fn a_start_that_is_inhibited_is_forgotten() {
+    let mut site = quiet();
+    pull(&mut site, "input.start_inhibit", "on");
+    site.pass_seconds(1);
+    set(&mut site, "genset_start");
+    site.pass_seconds(5);
+    pull(&mut site, "input.start_inhibit", "off");
+    site.pass_seconds(30);
+    assert!(!bit(&site, "common_status", 15) && site.code("genset_status") == 9);
 }
 
 #[test]

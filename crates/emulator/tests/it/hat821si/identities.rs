@@ -3,7 +3,10 @@
 use busbar_profile::Quality;
 use proptest::prelude::*;
 
-use super::{ON, bit, positions, quiet, send, with_story};
+use proptest::test_runner::RngSeed;
+
+use super::{ON, bit, positions, pull, quiet, send, with, with_story};
+use crate::levers::{events, happen};
 use crate::site::{Site, TENTH};
 
 const GROWING: [&str; 7] = [
@@ -79,6 +82,39 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 24,
+        rng_seed: RngSeed::Fixed(821),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn whatever_is_pulled_commanded_and_injected(
+        events in events(),
+        loops in any::<bool>(),
+        gensets in 0..3_u8,
+        elevator in prop_oneof![Just("0"), Just("7")],
+    ) {
+        let (loop_closing, gensets) = (u8::from(loops).to_string(), gensets.to_string());
+        let set = [("loop_closing", &*loop_closing), ("gensets", &*gensets), ("elevator_delay", elevator)];
+        let mut site = with(&set);
+        let mut last = accumulated(&site);
+        for (event, tenths) in &events {
+            happen(&mut site, *event);
+            for tenth in 0..*tenths {
+                site.pass(TENTH);
+                holds_whatever_befalls(&site, loops, &format!("{tenth} tenths after {event:?}"));
+            }
+            let now = accumulated(&site);
+            prop_assert!(last.iter().zip(&now).all(|(before, after)| before <= after), "{event:?}");
+            last = now;
+        }
+        prop_assert_eq!(site.device.misfits(), 0);
+    }
+}
+
 /// Those that switch sources more often than the many load switches.
 fn coils() -> Vec<u16> {
     let all = (15004..=15009).chain(15030..=15037);
@@ -110,6 +146,33 @@ fn holds(site: &Site, place: &str) {
     switching_agrees(site, place);
     loads_agree(site, place);
     derived_bits_agree(site, place);
+}
+
+/// What of it holds though switches jam, wires break, gensets stop and modules are silent.
+fn holds_whatever_befalls(site: &Site, loops: bool, place: &str) {
+    for source in ["s1", "s2"] {
+        voltages_agree(site, source, place);
+        powers_agree(site, source, place);
+        status_agrees(site, source, place);
+    }
+    differences_agree(site, place);
+    outputs_agree(site, place);
+    derived_bits_agree(site, place);
+    let joined = positions(site) == [1; 3];
+    assert!(loops || !joined, "{place}: the sources meet");
+    assert!(!joined || bit(site, "common_status", 12), "{place}: the loop closing bit");
+    for side in 1..=2 {
+        let outputs = ["closing", "opening"].map(|word| site.bits(&format!("load_{side}_{word}_outputs")));
+        assert!(outputs[0].intersection(&outputs[1]).is_empty(), "{place}: side {side}");
+        let [work, test] = ["work", "testing"].map(|at| site.bits(&format!("load_{side}_{at}_positions")));
+        assert!(work.intersection(&test).is_empty() && work.len() + test.len() == 12, "{place}: side {side}");
+        let number = site.number(&format!("load_{side}_trip_number"));
+        let trips = site.bits(&format!("load_{side}_trips"));
+        assert_eq!(number > 0.0, !trips.is_empty(), "{place}: side {side}");
+        let seconds =
+            ["present_supply", "total_supply"].map(|time| seconds(site, &format!("load_{side}_{time}")));
+        assert!(seconds[0] <= seconds[1], "{place}: side {side}");
+    }
 }
 
 fn phases(site: &Site, source: &str, quantity: &str) -> [f64; 3] {
@@ -145,8 +208,9 @@ fn powers_agree(site: &Site, source: &str, place: &str) {
     for phase in 0..3 {
         assert!((s[phase] - p[phase].hypot(q[phase])).abs() <= 0.5, "{place}: {source} {phase}");
         let expected = volts[phase] * amps[phase] / 1000.0;
-        // Half an ampere at 5.8 kV.
-        assert!((s[phase] - expected).abs() < 4.0, "{place}: {source} {phase} {} {expected}", s[phase]);
+        // Half an ampere, and half a volt.
+        let error = (volts[phase] + amps[phase]) / 2000.0 + 1.0;
+        assert!((s[phase] - expected).abs() < error, "{place}: {source} {phase} {} {expected}", s[phase]);
         let expected = if s[phase] > 0.0 { 100.0 * p[phase] / s[phase] } else { 0.0 };
         assert!(s[phase] < 20.0 || (factors[phase] - expected).abs() < 3.0, "{place}: {source} {phase}");
     }
@@ -167,7 +231,9 @@ fn status_agrees(site: &Site, source: &str, place: &str) {
     assert_eq!(kinds, expected, "{place}: {source} {status}");
     assert_eq!(delay > 0.0, status < 2, "{place}: {source} {status} {delay}");
     if status == 2 {
-        assert!(phases(site, source, "voltage").iter().all(|volts| *volts > 0.8 * 5774.0), "{place}");
+        let known = super::has(site, &format!("{source}_pt_broken_wire"));
+        let low = phases(site, source, "voltage").iter().filter(|volts| **volts < 0.8 * 5774.0).count();
+        assert!(low <= usize::from(known), "{place}: {source}");
     }
 }
 
@@ -188,9 +254,58 @@ fn differences_agree(site: &Site, place: &str) {
     }
 }
 
+#[test]
+fn at_both_ends_of_each_setting_a_bad_day_obeys_physics() {
+    let all: Vec<_> = quiet().device.settings().map(|(setting, _)| setting).collect();
+    for setting in all.iter().filter(|setting| !setting.id.ends_with("_priority")) {
+        for end in [setting.min, setting.max].map(|end| end.to_string()) {
+            let mut site = with(&[(&setting.id, &end)]);
+            for (lever, to, seconds) in [
+                ("load1", "3000", 5),
+                ("src1", "failed", 20),
+                ("src2", "l1_lost", 40),
+                ("src1", "normal", 25),
+                ("src2", "normal", 20),
+            ] {
+                pull(&mut site, lever, to);
+                for _ in 0..seconds {
+                    site.pass_seconds(1);
+                    let place = format!("{} = {end}, {lever} {to}", setting.id);
+                    for source in ["s1", "s2"] {
+                        voltages_agree(&site, source, &place);
+                    }
+                    outputs_agree(&site, &place);
+                    derived_bits_agree(&site, &place);
+                }
+            }
+            assert_eq!(site.device.misfits(), 0, "{} = {end}", setting.id);
+        }
+    }
+}
+
 fn switching_agrees(site: &Site, place: &str) {
     let [qs1, qtie, qs2] = positions(site);
     assert_ne!([qs1, qtie, qs2], [1; 3], "{place}: the sources meet");
+    let status = site.code("ats_status");
+    outputs_agree(site, place);
+    let moving = [1, 2, 3, 4, 20, 21].contains(&status);
+    assert_eq!(site.number("ats_delay") > 0.0, moving || status == 5, "{place}: status {status}");
+    for (side, opening) in [(1, 27), (2, 29)] {
+        let [opened, closed] =
+            ["opening", "closing"].map(|word| site.bits(&format!("load_{side}_{word}_outputs")));
+        assert!(status != opening || !opened.is_empty(), "{place}: status {status}");
+        let acts = site.number(&format!("load_{side}_act_number"));
+        let driven: Vec<f64> = opened.iter().chain(closed.iter()).map(|bit| f64::from(bit) + 1.0).collect();
+        assert!(
+            driven.is_empty() || driven.contains(&acts),
+            "{place}: side {side} drives {driven:?}, not {acts}"
+        );
+    }
+}
+
+/// Status, outputs, feedback and power of the three switches.
+fn outputs_agree(site: &Site, place: &str) {
+    let [qs1, qtie, qs2] = positions(site);
     let status = site.code("ats_status");
     let expected = match status {
         16 => Some([1, 0, 0]),
@@ -203,33 +318,20 @@ fn switching_agrees(site: &Site, place: &str) {
         _ => None,
     };
     assert!(expected.is_none_or(|expected| expected == [qs1, qtie, qs2]), "{place}: status {status}");
-    let outputs = [
-        (1, "switches", 0),
-        (2, "switches", 1),
-        (3, "switches", 2),
-        (4, "switches", 3),
-        (20, "tie_switch", 2),
-        (21, "tie_switch", 3),
-    ];
-    for (code, word, output) in outputs {
-        assert_eq!(bit(site, word, output), status == code, "{place}: status {status}, {word}.{output}");
+    for (codes, word, output) in [
+        ([1, 11], "switches", 0),
+        ([2, 2], "switches", 1),
+        ([3, 12], "switches", 2),
+        ([4, 4], "switches", 3),
+        ([20, 9], "tie_switch", 2),
+        ([21, 21], "tie_switch", 3),
+    ] {
+        let drives = codes.contains(&status);
+        assert_eq!(bit(site, word, output), drives, "{place}: status {status}, {word}.{output}");
     }
-    let moving = outputs.iter().any(|(code, ..)| *code == status);
-    assert_eq!(site.number("ats_delay") > 0.0, moving || status == 5, "{place}: status {status}");
     let carries = |source: &str| site.number(&format!("{source}_active_power")) > 0.0;
     assert!(qs1 == 1 || !carries("s1"), "{place}: power through an open QS1");
     assert!(qs2 == 1 || !carries("s2"), "{place}: power through an open QS2");
-    for (side, opening) in [(1, 27), (2, 29)] {
-        let [opened, closed] =
-            ["opening", "closing"].map(|word| site.bits(&format!("load_{side}_{word}_outputs")));
-        assert!(status != opening || !opened.is_empty(), "{place}: status {status}");
-        let acts = site.number(&format!("load_{side}_act_number"));
-        let driven: Vec<f64> = opened.iter().chain(closed.iter()).map(|bit| f64::from(bit) + 1.0).collect();
-        assert!(
-            driven.is_empty() || driven.contains(&acts),
-            "{place}: side {side} drives {driven:?}, not {acts}"
-        );
-    }
     let feedback = site.bits("aux_inputs");
     assert_eq!([0, 2, 1].map(|input| u8::from(feedback.contains(input))), [qs1, qtie, qs2], "{place}");
 }
@@ -263,6 +365,6 @@ fn derived_bits_agree(site: &Site, place: &str) {
     assert_eq!(common & 2 != 0, warning_bits != 0, "{place}: 500.1");
     assert_eq!(common & 1 != 0, common & 6 != 0, "{place}: 500.0");
     assert_ne!(common >> 9 & 1, common >> 13 & 1, "{place}: local or remote");
-    let started = [1, 8].contains(&site.code("genset_status"));
+    let started = [1, 3, 8].contains(&site.code("genset_status"));
     assert_eq!(common >> 15 & 1 == 1, started, "{place}: 500.15");
 }

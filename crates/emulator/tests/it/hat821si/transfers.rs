@@ -58,6 +58,46 @@ fn dips_that_are_shorter_than_the_delay_move_nothing() {
 }
 
 #[test]
+fn after_a_gap_of_whatever_length_everything_is_as_it_was() {
+    for tenths in 1..40 {
+        let mut site = quiet();
+        pull(&mut site, "src1", "failed");
+        site.pass(TENTH * tenths);
+        pull(&mut site, "src1", "normal");
+        site.pass_seconds(20);
+        let closed = site.bits("load_1_closed").len() + site.bits("load_2_closed").len();
+        assert_eq!((positions(&site), closed), ([1, 0, 1], 24), "{tenths} tenths");
+    }
+}
+
+#[test]
+fn a_switch_whose_first_closing_fails_is_closed_again_where_that_is_set() {
+    for (again, left, alarms) in [("0", [0, 0, 1], vec!["qtie_close_failure"]), ("3", [0, 1, 1], vec![])] {
+        let mut site = with(&[("closing_again_time", again)]);
+        pull(&mut site, "switch.qtie", "closes_at_second");
+        pull(&mut site, "src1", "failed");
+        site.pass_seconds(20);
+        assert_eq!((positions(&site), active(&site)), (left, alarms));
+    }
+}
+
+#[test]
+fn nobody_is_connected_to_a_source_that_has_just_failed() {
+    let mut site = with(&[("s2_abnormal_delay", "30")]);
+    pull(&mut site, "src1", "failed");
+    site.pass_seconds(4);
+    pull(&mut site, "src2", "failed");
+    site.pass_seconds(10);
+    assert_eq!((site.code("s2_voltage_status"), positions(&site)), (1, [1, 0, 1]));
+    set(&mut site, "transfer_011");
+    site.pass_seconds(5);
+    assert_eq!(positions(&site), [1, 0, 1]);
+    pull(&mut site, "src2", "normal");
+    site.pass_seconds(10);
+    assert_eq!(positions(&site), [0, 1, 1]);
+}
+
+#[test]
 fn delays_and_thresholds_are_as_they_are_set() {
     let mut site = with(&[("s1_abnormal_delay", "30"), ("s1_normal_delay", "3"), ("transfer_rest", "7")]);
     pull(&mut site, "src1", "failed");
@@ -226,6 +266,11 @@ fn elevators_stop_before_a_section_is_interrupted() {
     assert!(bit(&site, "controls_and_inhibits", 5), "until all is done");
     site.pass_seconds(5);
     assert!(!bit(&site, "controls_and_inhibits", 5) && positions(&site) == [1, 1, 0]);
+
+    let mut site = with(&[("elevator_delay", "60")]);
+    pull(&mut site, "src1", "failed");
+    site.pass_seconds(20);
+    assert_eq!(positions(&site), [0, 1, 1], "nothing stops where nothing runs");
 }
 
 #[test]
