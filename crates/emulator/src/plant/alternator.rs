@@ -37,13 +37,16 @@ pub(super) struct Alternator {
     /// V between phase and neutral, before the breaker.
     pub(super) voltage: f64,
     pub(super) avr: Avr,
+    /// V that the field makes, and the part of it that the current leaves at the terminals.
+    field: f64,
+    left: f64,
     /// kVA that the regulator has answered.
     answered: f64,
 }
 
 impl Alternator {
     pub(super) fn new() -> Self {
-        Self { voltage: 0.0, avr: Avr::Normal, answered: 0.0 }
+        Self { voltage: 0.0, avr: Avr::Normal, field: 0.0, left: 1.0, answered: 0.0 }
     }
 
     /// Builds up and holds the voltage of a turning alternator. A line that its grid has left chokes one that feeds it.
@@ -61,12 +64,19 @@ impl Alternator {
             rpm if rpm > EXCITED_FROM => settled * (rpm / (ROLL_OFF * RATED_RPM)).min(1.0),
             _ => remembered,
         };
-        let (left, memory) = if chokes { (CHOKED, CHOKES) } else { (ceiling(carried), 0.4) };
-        approach(&mut self.voltage, (left * excited).max(0.0), memory, dt);
+        approach(&mut self.field, excited.max(0.0), 0.4, dt);
         // One that stands has no voltage at all, however slowly the field dies.
         if rpm <= 0.0 {
-            self.voltage = 0.0;
+            self.field = 0.0;
         }
+        // The field is still there when what chokes it is gone.
+        approach(&mut self.left, if chokes { CHOKED } else { ceiling(carried) }, CHOKES, dt);
+        self.voltage = self.field * self.left;
+    }
+
+    /// A busbar that is held by others gives it its voltage.
+    pub(super) fn hold(&mut self, volts: f64) {
+        (self.field, self.left, self.voltage) = (volts, 1.0, volts);
     }
 }
 

@@ -298,7 +298,7 @@ impl Plant {
     fn drag(&mut self, dt: f64, speed: f64, voltage: [f64; 3], frequency: f64) {
         let missing = frequency / HERTZ_PER_RPM - speed;
         self.engine.speed = speed + missing.clamp(-DRAG * dt, DRAG * dt);
-        self.alternator.voltage = live_average(voltage);
+        self.alternator.hold(live_average(voltage));
     }
 
     /// V of each phase at the genset's terminals: those of the grid where it is on the same busbar, and next to nothing

@@ -151,9 +151,9 @@ fn transfer(site: &Site, place: &str) -> (Vec<f64>, Vec<Option<(f64, f64)>>) {
 }
 
 fn compressor(site: &Site, place: &str) -> (Vec<f64>, Vec<Option<(f64, f64)>>) {
-    if known(site, "engine_speed") == Some(0.0) {
-        let asked = ["torque_percentage", "fuel_consumption"].map(|id| known(site, id).unwrap_or(0.0));
-        assert_eq!(asked, [0.0; 2], "{place}: it stands");
+    let [torque, burned] = ["torque_percentage", "fuel_consumption"].map(|id| known(site, id));
+    if let (Some(torque), Some(burned)) = (torque, burned) {
+        assert_eq!(torque == 0.0, burned == 0.0, "{place}: {torque} % for {burned} L/h");
     }
     let warm = ["engine_temperature", "oil_temperature", "fuel_temperature", "air_inlet_temperature"];
     let counters = ["total_starts", "total_fuel", "event_logs"];

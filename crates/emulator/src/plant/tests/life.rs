@@ -59,6 +59,34 @@ fn a_load_step_dips_speed_and_voltage_and_both_come_back() {
 }
 
 #[test]
+fn a_full_step_up_and_down_is_within_class_g2_of_iso_8528_5() {
+    let (mut plant, controls) = on_load(3);
+    pull(&mut plant, "load.power_factor", "0.8");
+    pull(&mut plant, "load", "0");
+    run(&mut plant, &controls, 20.0);
+    // Least and most of frequency and voltage, in per cent, and the seconds until each is back.
+    for (kw, hertz, volts) in [("80", -10.0..-2.0, -20.0..-7.0), ("0", 2.0..12.0, 7.0..25.0)] {
+        pull(&mut plant, "load", kw);
+        let (mut farthest, mut away) = ([0.0_f64; 2], [0.0; 2]);
+        for tenth in 1..150 {
+            run(&mut plant, &controls, DT);
+            let now = [plant.genset.frequency / 50.0, plant.genset.average_voltage() / 230.9];
+            for (index, (now, back)) in now.into_iter().zip([2.0, 2.5]).enumerate() {
+                let percent = 100.0 * (now - 1.0);
+                if percent.abs() > farthest[index].abs() {
+                    farthest[index] = percent;
+                }
+                if percent.abs() > back {
+                    away[index] = f64::from(tenth) * DT;
+                }
+            }
+        }
+        assert!(hertz.contains(&farthest[0]) && volts.contains(&farthest[1]), "{kw} kW: {farthest:?} %");
+        assert!(away[0] < 5.0 && away[1] < 6.0, "{kw} kW: {away:?} s");
+    }
+}
+
+#[test]
 fn cranking_dips_the_battery_and_is_remembered() {
     let mut plant = Plant::new(4);
     run(&mut plant, &on_mains(), 10.0);

@@ -194,7 +194,8 @@ fn a_line_that_its_grid_has_left_chokes_the_genset_until_they_part() {
         assert!(plant.genset.average_current() > 300.0 && plant.mains.total_active() < 0.0);
         assert_eq!(plant.genset.total_active(), -plant.mains.total_active());
         controls.mains_breaker = false;
-        run(&mut plant, &controls, 4.0);
+        // The field is still there: the voltage is back at once.
+        run(&mut plant, &controls, 1.0);
         assert_eq!(genset_healthy(&plant), !stuck, "{:?}", plant.genset);
         assert_eq!(plant.mains.voltage == [0.0; 3], !stuck);
         assert_eq!(plant.genset.total_active() > 25.0, !stuck);
