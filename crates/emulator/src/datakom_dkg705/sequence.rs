@@ -142,7 +142,16 @@ impl Sequence {
         self.operation == Cranking
     }
 
-    /// Whether the engine has had its time to come to speed: it is regulated, and its protections are live.
+    /// Whether the engine has been made ready for its load, and is led by the outputs.
+    pub(super) fn is_regulated(&self) -> bool {
+        match self.operation {
+            WaitBeforeCrank | Cranking => false,
+            Heating => self.timer.is_zero(),
+            _ => self.fuel,
+        }
+    }
+
+    /// Whether the engine has had its time to come to speed: its protections are live.
     pub(super) fn is_up_to_speed(&self) -> bool {
         match self.operation {
             WaitBeforeCrank | Cranking => false,
