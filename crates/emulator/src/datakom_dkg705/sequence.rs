@@ -329,7 +329,7 @@ impl Sequence {
             LoadOnGenset if !sensed.genset_contactor => Some(mains_back(sensed).unwrap_or(unloaded(demand))),
             // The genset would go on feeding a dead line.
             LoadOnGenset if sensed.mains_contactor && !sensed.mains_healthy => {
-                (self.elapsed >= OPENS_WITHIN + set.timers.contactor_wait).then_some(GensetContactor)
+                (self.elapsed >= OPENS_WITHIN).then_some(GensetContactor)
             }
             LoadOnGenset => (!stays && self.returns_without_break(sensed, set) && !sensed.mains_contactor)
                 .then_some(SynchronizeToMains),

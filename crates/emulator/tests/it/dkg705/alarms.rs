@@ -65,7 +65,7 @@ const CAUSES: &[Cause] = &[
     cause("shutdown_alarms_1.low_fuel_level", &[], AT_REST, &[("tank", "2")], 5),
     cause(
         "shutdown_alarms_1.high_oil_temperature",
-        &[("oil_temperature_margin", "0")],
+        &[("oil_temperature_margin", "0"), ("load_shedding_high", "0")],
         LOADED,
         &[("load", "75")],
         900,
@@ -151,7 +151,7 @@ const CAUSES: &[Cause] = &[
     cause("warning_alarms_2.low_fuel_level", &[], AT_REST, &[("tank", "15")], 5),
     cause(
         "warning_alarms_2.high_oil_temperature",
-        &[("oil_temperature_margin", "0")],
+        &[("oil_temperature_margin", "0"), ("load_shedding_high", "0")],
         LOADED,
         &[("load", "75")],
         900,
