@@ -379,7 +379,7 @@ impl Panel for DatakomDkg705 {
         self.sequence.step(dt, demand, sensed, &self.set);
         let task = Task {
             operation: self.sequence.operation(),
-            regulating: self.sequence.is_up_to_speed(),
+            regulating: self.sequence.is_regulated(),
             mains_keep: self.set.peak.as_ref().filter(|_| demand.parallel).map(|peak| peak.mains),
         };
         self.regulation.step(dt, task, &self.measures, &mut self.plant, &self.set);

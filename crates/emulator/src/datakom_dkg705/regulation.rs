@@ -49,7 +49,7 @@ struct Output {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Task {
     pub(super) operation: Operation,
-    /// The genset is at its speed.
+    /// The genset is ready for its load.
     pub(super) regulating: bool,
     /// kW that mains keep which only want help.
     pub(super) mains_keep: Option<f64>,

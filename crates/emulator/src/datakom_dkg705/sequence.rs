@@ -142,7 +142,16 @@ impl Sequence {
         self.operation == Cranking
     }
 
-    /// Whether the engine has had its time to come to speed: it is regulated, and its protections are live.
+    /// Whether the engine has been made ready for its load, and is led by the outputs.
+    pub(super) fn is_regulated(&self) -> bool {
+        match self.operation {
+            WaitBeforeCrank | Cranking => false,
+            Heating => self.timer.is_zero(),
+            _ => self.fuel,
+        }
+    }
+
+    /// Whether the engine has had its time to come to speed: its protections are live.
     pub(super) fn is_up_to_speed(&self) -> bool {
         match self.operation {
             WaitBeforeCrank | Cranking => false,
@@ -320,7 +329,7 @@ impl Sequence {
             LoadOnGenset if !sensed.genset_contactor => Some(mains_back(sensed).unwrap_or(unloaded(demand))),
             // The genset would go on feeding a dead line.
             LoadOnGenset if sensed.mains_contactor && !sensed.mains_healthy => {
-                (self.elapsed >= OPENS_WITHIN + set.timers.contactor_wait).then_some(GensetContactor)
+                (self.elapsed >= OPENS_WITHIN).then_some(GensetContactor)
             }
             LoadOnGenset => (!stays && self.returns_without_break(sensed, set) && !sensed.mains_contactor)
                 .then_some(SynchronizeToMains),

@@ -496,6 +496,14 @@ fn the_holdoff_counts_from_idle_speed_on() {
 }
 
 #[test]
+fn a_long_holdoff_does_not_keep_the_genset_from_synchronizing() {
+    let mut site = set(&[("holdoff_time", "60")]);
+    site.write(MODE_KEYS, LOAD_TEST);
+    assert_eq!(site.walk_to(8), [0, 1, 2, 3, 4, 5, 6, 15, 8]);
+    assert!(site.bits("warning_alarms_2").is_empty());
+}
+
+#[test]
 fn a_genset_of_the_wrong_order_is_stopped_unless_nobody_looks() {
     for (ignore, wrong) in [("0", true), ("1", false)] {
         let mut site = set(&[("ignore_phase_order", ignore)]);
