@@ -1,14 +1,17 @@
 //! How a unit beside the mains notices that they are gone although it feeds their line: by the rate at which their
 //! frequency changes, and by the jump of the voltage when the genset is suddenly left with another load.
 
-use crate::plant::RATED_KW;
+use crate::plant::{RATED_KW, RATED_VOLTAGE};
 
 use super::readings::Readings;
 
 /// Seconds over which a rate is measured.
 const WINDOW: f64 = 0.5;
-/// Degrees by which rated power bends the voltage behind the genset's reactance.
+/// Degrees by which rated active current bends the voltage behind the genset's reactance.
 const BEND: f64 = 12.0;
+
+/// V below which a meter tells no power.
+const LEAST_VOLTAGE: f64 = 20.0;
 
 /// What the last look saw.
 #[derive(Clone, Debug, Default)]
@@ -17,7 +20,7 @@ pub(super) struct LossOfMains {
     frequency: Option<f64>,
     /// Hz a second.
     rate: f64,
-    /// kW of the genset beside the mains.
+    /// kW that the genset's active current beside the mains would be at its rated voltage.
     carried: Option<f64>,
 }
 
@@ -34,7 +37,11 @@ impl LossOfMains {
         };
         self.frequency = frequency;
 
-        let carried = (readings.side_by_side && !jolting).then_some(readings.genset_active);
+        let (least, greatest) = readings.genset_voltage;
+        let volts = (0.5 * (least + greatest)).max(LEAST_VOLTAGE);
+        // What bends the voltage is the active current.
+        let active = readings.genset_active * RATED_VOLTAGE / volts;
+        let carried = (readings.side_by_side && !jolting).then_some(active);
         let step = match (self.carried, carried) {
             (Some(before), Some(now)) => now - before,
             _ => 0.0,
@@ -54,6 +61,7 @@ mod tests {
             mains_frequency: hertz,
             side_by_side: true,
             genset_active: kw,
+            genset_voltage: (RATED_VOLTAGE, RATED_VOLTAGE),
             ..Readings::default()
         };
         loss.step(0.1, &mut readings, false);
