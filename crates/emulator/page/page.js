@@ -11,6 +11,7 @@ const TOKEN = 'busbar-imitation-token'
 /** What an instructor most often wants to happen: lever, position, what it is called, and what undoes it. */
 const SWITCHES = [
   ['mains', 'failed', 'Fail the mains', 'Give the mains back'],
+  ['grid', 'failed', 'Fail the grid', 'Give the grid back'],
   ['src1', 'failed', 'Fail source 1', 'Give source 1 back'],
   ['src2', 'failed', 'Fail source 2', 'Give source 2 back'],
   ['tank', 0, 'Drain the tank'],
