@@ -252,6 +252,7 @@ impl DatakomD {
             running: self.readings.running,
             protected: self.sequence.operation().is_up_to_speed(),
             parallel: self.readings.side_by_side,
+            in_company: self.plant.sisters.shares(),
             exporting: matches!(self.sequence.operation(), Exporting | TransferToMains),
             lenient: self.contacts.protections_disabled,
         };

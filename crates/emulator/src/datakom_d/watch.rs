@@ -26,7 +26,9 @@ enum Armed {
     Protected,
     /// While genset and mains feed one busbar.
     Parallel,
-    /// The same, and nothing is to be exported.
+    /// The same, or with other gensets.
+    Beside,
+    /// While genset and mains feed one busbar, and nothing is to be exported.
     Importing,
 }
 
@@ -36,6 +38,8 @@ pub(super) struct Situation {
     pub(super) running: bool,
     pub(super) protected: bool,
     pub(super) parallel: bool,
+    /// Other gensets feed the busbar too.
+    pub(super) in_company: bool,
     pub(super) exporting: bool,
     /// What would trip the genset only warns.
     pub(super) lenient: bool,
@@ -48,6 +52,7 @@ impl Situation {
             Armed::Running => self.running,
             Armed::Protected => self.protected,
             Armed::Parallel => self.parallel,
+            Armed::Beside => self.parallel || self.in_company,
             Armed::Importing => self.parallel && !self.exporting,
         }
     }
@@ -92,7 +97,7 @@ const fn rule(
 }
 
 use After::{Seconds, Setting};
-use Armed::{Always, Importing, Parallel, Protected, Running};
+use Armed::{Always, Beside, Importing, Parallel, Protected, Running};
 use Class::{LoadDump, Shutdown, Warning};
 use Limit::{Above, Below, True};
 
@@ -141,9 +146,9 @@ const RULES: &[Rule] = &[
     rule(106, LoadDump, Protected, Above("over_current_load_dump", 4.0), Setting("overload_delay"), |r| Some(r.genset_current)),
     rule(107, Warning, Protected, Above("overload_warning", 2.0), Seconds(3.0), |r| Some(r.genset_active)),
     rule(107, LoadDump, Protected, Above("overload_load_dump", 2.0), Setting("overload_delay"), |r| Some(r.genset_active)),
-    rule(108, LoadDump, Parallel, Above("reverse_power_load_dump", 1.0), Seconds(2.0), |r| Some(-r.genset_active)),
+    rule(108, LoadDump, Beside, Above("reverse_power_load_dump", 1.0), Seconds(2.0), |r| Some(-r.genset_active)),
     rule(MAINS_PHASE_ORDER, Warning, Always, True, Seconds(1.0), |r| flag(r.mains_alive && !r.mains_in_order)),
-    rule(117, LoadDump, Parallel, Above("excitation_lost_load_dump", 2.0), Seconds(2.0), |r| Some(-r.genset_reactive)),
+    rule(117, LoadDump, Beside, Above("excitation_lost_load_dump", 2.0), Seconds(2.0), |r| Some(-r.genset_reactive)),
     rule(121, Warning, Parallel, True, Seconds(0.0), |r| flag(!r.mains_alive)),
     rule(122, Warning, Parallel, Below("mains_low_frequency", 0.2), Seconds(0.2), |r| Some(r.mains_frequency).filter(|_| r.mains_alive)),
     rule(122, Warning, Parallel, Above("mains_high_frequency", 0.2), Seconds(0.2), |r| Some(r.mains_frequency).filter(|_| r.mains_alive)),
@@ -282,6 +287,7 @@ mod tests {
             Running => "engine running",
             Protected => "protections live",
             Parallel => "both breakers closed",
+            Beside => "both breakers closed, or beside other gensets",
             Importing => "both breakers closed, not in 15 and 18",
         };
         let limit = match rule.limit {

@@ -163,7 +163,7 @@ fn forged(framing: Framing, mut answer: Vec<u8>, place: usize, other: impl Fn(u8
     if let Some(byte) = answer.get_mut(head + place) {
         *byte = other(*byte);
     }
-    if framing == Framing::Rtu {
+    if framing == Framing::Rtu && !answer.is_empty() {
         answer.truncate(answer.len().saturating_sub(CHECK_SUM));
         let check_sum = rtu::crc16(&answer);
         answer.extend(check_sum.to_le_bytes());

@@ -10,6 +10,7 @@ use super::{Fleet, Joint, Member};
 use crate::config::Config;
 use crate::device::Device;
 use crate::notes::{self, Entry, Notes, entries};
+use crate::server::NEW_PTY;
 use busbar_profile::text::shown;
 
 const FILE: [&str; 5] = ["fleet", "wires", "controllers", "supplies", "bus_bars"];
@@ -35,9 +36,23 @@ pub(super) fn fleet(file: &str, text: &str) -> Result<Fleet, Findings> {
 /// What is known so far.
 #[derive(Default)]
 struct Draft {
-    wires: Vec<(String, Endpoint)>,
+    wires: Vec<Line>,
     members: Vec<(Member, Device)>,
     joints: Vec<Joint>,
+    /// Ids of wires and of controllers that are there, sound or not: what is wrong with them is said where they stand.
+    wires_there: Vec<String>,
+    members_there: Vec<String>,
+    /// Ids of wires on which somebody wants to be.
+    wanted: Vec<String>,
+    /// There were too many controllers, and it has been said.
+    is_full: bool,
+}
+
+/// A wire that is sound, and where it stands.
+struct Line {
+    id: String,
+    endpoint: Endpoint,
+    span: Range<usize>,
 }
 
 fn read(root: &DeTable<'_>, notes: &mut Notes<'_>) -> Option<Fleet> {
@@ -69,7 +84,8 @@ fn read(root: &DeTable<'_>, notes: &mut Notes<'_>) -> Option<Fleet> {
     if !all.iter().any(|entry| entry.key == "fleet") {
         notes.add(0..0, "there is no [fleet]", "begin the file with [fleet] and title = \"Two gensets\"");
     }
-    let wires = draft.wires.into_iter().map(|(_, endpoint)| endpoint).collect();
+    draft.empty_wires(notes);
+    let wires = draft.wires.into_iter().map(|wire| wire.endpoint).collect();
     let members = draft.members.into_iter().map(|(member, _)| member).collect();
     Some(Fleet { title: title?, wires, members, joints: draft.joints })
 }
@@ -98,13 +114,12 @@ impl Draft {
         for entry in entries(table) {
             match entry.key.as_str() {
                 "id" => {
-                    let known = self
-                        .wires
-                        .iter()
-                        .any(|(known, _)| Some(known.as_str()) == entry.value.get_ref().as_str());
+                    let text = entry.value.get_ref().as_str();
+                    self.wires_there.extend(text.map(str::to_owned));
+                    let known = self.wires.iter().any(|known| Some(known.id.as_str()) == text);
                     id = Some(new_id(&entry, known, notes));
                 }
-                "endpoint" => endpoint = Some(self::endpoint(&entry, notes)),
+                "endpoint" => endpoint = Some(self.endpoint(&entry, notes)),
                 _ => notes.unknown_key(&entry, "[[wires]]", &WIRE),
             }
         }
@@ -115,8 +130,32 @@ impl Draft {
                 notes.missing(span.clone(), "[[wires]]", key, example);
             }
         }
-        self.wires.push((id??, endpoint??));
+        self.wires.push(Line { id: id??, endpoint: endpoint??, span });
         Some(())
+    }
+
+    fn endpoint(&self, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<Endpoint> {
+        let endpoint: Endpoint = match notes.text(entry)?.parse() {
+            Ok(endpoint) => endpoint,
+            Err(error) => {
+                notes.add_error(entry.value.span(), &error);
+                return None;
+            }
+        };
+        let place = place(&endpoint);
+        if place.is_some() && self.wires.iter().any(|wire| self::place(&wire.endpoint) == place) {
+            let help = "give each wire an endpoint of its own, or put its controllers on the other wire";
+            notes.add(entry.value.span(), "another wire has this endpoint", help);
+        }
+        Some(endpoint)
+    }
+
+    fn empty_wires(&self, notes: &mut Notes<'_>) {
+        let empty = |wire: &&Line| !self.wanted.contains(&wire.id);
+        for wire in self.wires.iter().filter(empty).filter(|_| !self.wanted.is_empty()) {
+            let help = "put a controller on it, or leave it out";
+            notes.add(wire.span.clone(), format!("nobody is on wire `{}`", wire.id), help);
+        }
     }
 
     fn controller(&mut self, table: &DeTable<'_>, span: Range<usize>, notes: &mut Notes<'_>) -> Option<()> {
@@ -130,8 +169,14 @@ impl Draft {
                 notes.missing(span.clone(), "[[controllers]]", key, example);
             }
         }
+        let id = of("id").and_then(|entry| entry.value.get_ref().as_str());
+        self.members_there.extend(id.map(str::to_owned));
         if self.members.len() == MOST {
-            notes.add(span, format!("these are more than {MOST} controllers"), "make two fleets of them");
+            if !self.is_full {
+                let message = format!("these are more than {MOST} controllers");
+                notes.add(span, message, "make two fleets of them");
+            }
+            self.is_full = true;
             return None;
         }
         let id = of("id").and_then(|entry| {
@@ -161,7 +206,15 @@ impl Draft {
         let profile = notes.profile(of("profile")?)?;
         let default = profile.wire.unit.default.unwrap_or(1);
         let unit = match of("unit") {
-            Some(entry) => u8::try_from(notes.whole(entry)?).unwrap_or_default(),
+            Some(entry) => {
+                let (number, range) = (notes.whole(entry)?, &profile.wire.unit);
+                let unit = u8::try_from(number).ok().filter(|unit| (range.min..=range.max).contains(unit));
+                if unit.is_none() {
+                    let help = format!("write a number from {} to {}", range.min, range.max);
+                    notes.add(entry.value.span(), format!("unit {number} is not possible"), help);
+                }
+                unit?
+            }
             None => default,
         };
         // By itself each is another machine.
@@ -174,29 +227,26 @@ impl Draft {
         match Device::new(&config) {
             Ok(probe) => Some((config, probe)),
             Err(error) => {
-                let culprit = match error {
-                    crate::StartError::Unit { .. } => of("unit"),
-                    _ => of("model"),
-                };
-                notes.add_error(culprit.or(of("profile"))?.value.span(), &error);
+                notes.add_error(of("model").or(of("profile"))?.value.span(), &error);
                 None
             }
         }
     }
 
-    fn wire_of(&self, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<usize> {
+    fn wire_of(&mut self, entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<usize> {
         let text = notes.text(entry)?;
-        let place = self.wires.iter().position(|(id, _)| *id == text);
-        if place.is_none() {
-            unknown("wire", &text, entry.value.span(), self.wires.iter().map(|(id, _)| id.as_str()), notes);
+        let place = self.wires.iter().position(|wire| wire.id == text);
+        if !self.wires_there.contains(&text) {
+            unknown("wire", &text, entry.value.span(), self.wires.iter().map(|wire| wire.id.as_str()), notes);
         }
+        self.wanted.push(text);
         place
     }
 
     /// The index of a controller that a text names.
     fn member(&self, text: &str, span: Range<usize>, notes: &mut Notes<'_>) -> Option<usize> {
         let place = self.members.iter().position(|(member, _)| member.id == text);
-        if place.is_none() {
+        if !self.members_there.iter().any(|id| id == text) {
             unknown(
                 "controller",
                 text,
@@ -244,15 +294,20 @@ impl Draft {
         let mut listed = None;
         for entry in entries(table) {
             match entry.key.as_str() {
-                "gensets" => listed = Some(notes.texts(&entry)),
+                "gensets" => {
+                    let value = entry.value.get_ref();
+                    let is_short =
+                        value.as_str().is_some() || value.as_array().is_some_and(|list| list.len() < 2);
+                    listed = Some((notes.texts(&entry), is_short));
+                }
                 _ => notes.unknown_key(&entry, "[[bus_bars]]", &["gensets"]),
             }
         }
-        let Some(listed) = listed else {
+        let Some((listed, is_short)) = listed else {
             notes.missing(span, "[[bus_bars]]", "gensets", "[\"genset-1\", \"genset-2\"]");
             return None;
         };
-        if listed.len() < 2 {
+        if is_short {
             notes.add(span, "a bus bar needs two gensets to share", "name two or more in `gensets`");
         }
         let mut gensets = Vec::new();
@@ -322,13 +377,14 @@ fn new_id(entry: &Entry<'_, '_>, known: bool, notes: &mut Notes<'_>) -> Option<S
     Some(id)
 }
 
-fn endpoint(entry: &Entry<'_, '_>, notes: &mut Notes<'_>) -> Option<Endpoint> {
-    match notes.text(entry)?.parse() {
-        Ok(endpoint) => Some(endpoint),
-        Err(error) => {
-            notes.add_error(entry.value.span(), &error);
-            None
+/// What of an endpoint only one wire can have; none where the system chooses it.
+fn place(endpoint: &Endpoint) -> Option<String> {
+    match endpoint {
+        Endpoint::Tcp { host, port } | Endpoint::RtuTcp { host, port } => {
+            (*port != 0).then(|| format!("{host}:{port}"))
         }
+        Endpoint::Rtu { path, .. } => (path != NEW_PTY).then(|| path.clone()),
+        _ => None,
     }
 }
 
@@ -341,6 +397,7 @@ fn unknown<'k>(
 ) {
     let help = match nearest(text, known.clone()) {
         Some(known) => format!("did you mean `{known}`?"),
+        None if known.clone().next().is_none() => format!("add [[{kind}s]] with this id"),
         None => format!("there is: {}", known.collect::<Vec<_>>().join(", ")),
     };
     notes.add(span, format!("there is no {kind} `{}`", shown(text)), help);

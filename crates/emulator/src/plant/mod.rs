@@ -47,7 +47,7 @@ use grid::{DEAD_PHASE, Grid};
 use load::{Load, NO_LOAD, PhaseLoads, tenth};
 use parallel::{Coupling, Set, live_average};
 use senders::Senders;
-use sisters::Feeding;
+use sisters::{Feeding, Machine};
 use supplies::Service;
 
 /// Nameplate of the imitated genset: 100 kVA, 230/400 V, 50 Hz, four poles.
@@ -200,12 +200,25 @@ impl Plant {
 
     /// What this genset and the consumers behind it are to the bus bar that it shares with others.
     pub(crate) fn offer(&self) -> Offer {
-        self.sisters.offer(self.genset.voltage)
+        self.sisters.offer(self.engine.speed, self.alternator.voltage, self.genset.voltage)
     }
 
-    /// Says what the others on its bus bar are to it.
+    /// Says what the others on its bus bar are to it: whatever is on one bus bar has one speed and one voltage.
     pub(crate) fn join(&mut self, others: Offer) {
-        self.sisters.others = Some(others);
+        let (speed, volts) = self.sisters.join(self.offer(), others);
+        if let Some(speed) = speed {
+            self.engine.speed = speed;
+            self.genset.frequency = speed * HERTZ_PER_RPM;
+        }
+        if let Some(volts) = volts.filter(|_| self.alternator.voltage > 0.0) {
+            let part = volts / self.alternator.voltage;
+            self.alternator.hold(volts);
+            self.genset.voltage = self.genset.voltage.map(|phase| phase * part);
+        }
+        if self.sisters.shares() && self.is_joined() {
+            self.mains.voltage = self.genset.voltage;
+            self.mains.frequency = grid::found(self.genset.voltage, self.genset.frequency);
+        }
     }
 
     /// Whether genset and grid feed one busbar.
@@ -338,18 +351,22 @@ impl Plant {
             (false, true) => Feeding::Genset,
             (false, false) => Feeding::Nobody,
         };
-        let shared = self.sisters.share(dt, feeding, load, &mut self.random);
+        let set = Set {
+            running: self.engine.is_running(),
+            runaway: self.engine.governor.fault == Fault::RunningAway,
+            governor: self.engine.governor.set_point(),
+            excitation: &self.excitation,
+            avr: self.alternator.avr,
+        };
+        let machine = Machine {
+            speed: self.engine.speed,
+            voltage: self.alternator.voltage,
+            active: set.forced_active(),
+            reactive: set.forced_reactive(),
+        };
+        let shared = self.sisters.share(dt, feeding, load, machine, &mut self.random);
         match (on_mains, on_genset) {
-            _ if parallel => {
-                let set = Set {
-                    running: self.engine.is_running(),
-                    runaway: self.engine.governor.fault == Fault::RunningAway,
-                    governor: self.engine.governor.set_point(),
-                    excitation: &self.excitation,
-                    avr: self.alternator.avr,
-                };
-                self.coupling.split(dt, load, grid, &set)
-            }
+            _ if parallel => self.coupling.split(dt, load, grid, &set),
             (true, _) => (load, NO_LOAD),
             (_, true) => (NO_LOAD, shared),
             _ => (NO_LOAD, NO_LOAD),

@@ -10,9 +10,9 @@ use super::{
 };
 
 /// Seconds in which power follows a governor or a voltage regulator.
-const FOLLOWING: f64 = 0.4;
+pub(super) const FOLLOWING: f64 = 0.4;
 /// kW that the grid needs to turn an engine without fuel.
-const MOTORING: f64 = 9.6;
+pub(super) const MOTORING: f64 = 9.6;
 /// Beyond these two live sources are not joined without a jolt: degrees, Hz, V.
 const ANGLE_WINDOW: f64 = 20.0;
 const SLIP_WINDOW: f64 = 0.6;
@@ -173,23 +173,35 @@ pub(super) struct Set<'a> {
 }
 
 impl Set<'_> {
+    /// kW that it gives whatever is wanted of it; none where its governor does its work.
+    pub(super) fn forced_active(&self) -> Option<f64> {
+        match (self.running, self.runaway) {
+            (false, _) => Some(-MOTORING),
+            (_, true) => Some(engine::MOST_KW),
+            _ => None,
+        }
+    }
+
+    /// kvar that it gives whatever is wanted of it; none where its regulator does its work.
+    pub(super) fn forced_reactive(&self) -> Option<f64> {
+        match self.avr {
+            // Without a field of its own it takes it from the others.
+            Avr::Failed => Some(-0.7 * RATED_KVAR),
+            Avr::High => Some(1.5 * RATED_KVAR),
+            Avr::Normal => None,
+        }
+    }
+
     /// kW at a frequency that the grid holds.
     fn active(&self, hertz: f64) -> f64 {
-        match (self.running, self.runaway) {
-            (false, _) => -MOTORING,
-            (_, true) => engine::MOST_KW,
-            _ => (RATED_KW * self.governor.part_at(RATED_RPM, hertz / HERTZ_PER_RPM)).max(-MOTORING),
-        }
+        let governed = || RATED_KW * self.governor.part_at(RATED_RPM, hertz / HERTZ_PER_RPM);
+        self.forced_active().unwrap_or_else(|| governed().max(-MOTORING))
     }
 
     /// kvar at a voltage that the grid holds.
     fn reactive(&self, volts: f64) -> f64 {
-        match self.avr {
-            // Without a field of its own it takes it from the grid.
-            Avr::Failed => -0.7 * RATED_KVAR,
-            Avr::High => 1.5 * RATED_KVAR,
-            Avr::Normal => RATED_KVAR * self.excitation.part_at(RATED_VOLTAGE, volts),
-        }
+        let regulated = || RATED_KVAR * self.excitation.part_at(RATED_VOLTAGE, volts);
+        self.forced_reactive().unwrap_or_else(regulated)
     }
 }
 

@@ -2,12 +2,14 @@
 //!
 //! Imagined ones of the same make come on it one after the other and leave it with this set. Real ones have plants of
 //! their own: each plant offers what it is to the bus bar and hears what the others are. A set that comes on a live bar is
-//! brought in step first; the consumers of a set that has left it stay on it, unless the mains feed them.
+//! brought in step first, and from then on turns as fast as all others and has their voltage; the consumers of a set that
+//! has left it stay on it, unless the mains feed them. What a sick set gives is its own affair, and the others give the rest.
 
 use crate::random::{Drift, Random, approach};
 
-use super::RATED_KW;
 use super::load::{PhaseLoads, tenth};
+use super::parallel::{FOLLOWING, MOTORING};
+use super::{RATED_KW, alternator};
 
 /// How many imagined ones there can be.
 pub(super) const MOST: u8 = 3;
@@ -15,6 +17,9 @@ pub(super) const MOST: u8 = 3;
 const APART: f64 = 6.0;
 /// Seconds in which one takes its share over.
 const TAKING: f64 = 2.5;
+/// rpm and V within which a set is taken for brought in step.
+const SPEED_WINDOW: f64 = 45.0;
+const VOLTAGE_WINDOW: f64 = 25.0;
 
 /// What feeds the consumers of a plant by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,29 +29,82 @@ pub(super) enum Feeding {
     Genset,
 }
 
+/// A genset as the others on its bus bar feel it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Machine {
+    /// rpm and V that it has.
+    pub(super) speed: f64,
+    pub(super) voltage: f64,
+    /// kW and kvar that it gives whatever is wanted of it; none where its governor and its regulator do their work.
+    pub(super) active: Option<f64>,
+    pub(super) reactive: Option<f64>,
+}
+
+/// A sum and how many are in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sum(f64, f64);
+
+impl Sum {
+    fn of(value: f64, counts: bool) -> Self {
+        if counts { Self(value, 1.0) } else { Self::default() }
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self(self.0 + other.0, self.1 + other.1)
+    }
+
+    fn mean(self) -> Option<f64> {
+        (self.1 > 0.0).then(|| self.0 / self.1)
+    }
+}
+
 /// What one plant, or several together, are to the bus bar.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Offer {
-    /// Shares of the load that its gensets take.
-    weight: f64,
-    /// Gensets that take any.
+    /// Shares of the active and of the reactive load that its gensets take.
+    weights: [f64; 2],
+    /// kW and kvar that those give which take no share.
+    forced: [f64; 2],
+    /// Gensets that are on the bus bar.
     sets: f64,
     /// kW and kvar of each phase that its consumers want of the bus bar.
     load: PhaseLoads,
     /// V of each phase of a genset that feeds it.
     voltage: [f64; 3],
+    /// rpm of those whose governors hold the speed, and of those that run away.
+    governed: Sum,
+    runaway: Sum,
+    /// V of those that have a field.
+    excited: Sum,
 }
 
 impl Offer {
     /// Both together.
     pub(crate) fn and(self, other: Self) -> Self {
         let sum = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|phase| a[phase] + b[phase]);
+        let pair = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
         Self {
-            weight: self.weight + other.weight,
+            weights: pair(self.weights, other.weights),
+            forced: pair(self.forced, other.forced),
             sets: self.sets + other.sets,
             load: (sum(self.load.0, other.load.0), sum(self.load.1, other.load.1)),
             voltage: std::array::from_fn(|phase| self.voltage[phase].max(other.voltage[phase])),
+            governed: self.governed.and(other.governed),
+            runaway: self.runaway.and(other.runaway),
+            excited: self.excited.and(other.excited),
         }
+    }
+
+    /// rpm at which it is driven: who runs away drives it only where no governor is left to hold it.
+    fn speed(&self) -> Option<f64> {
+        self.governed.mean().or(self.runaway.mean())
+    }
+
+    /// Whether a genset on it is in step.
+    fn meets(&self, machine: &Machine) -> bool {
+        let near = |mean: Option<f64>, own: f64, window: f64| mean.is_none_or(|m| (m - own).abs() < window);
+        near(self.speed(), machine.speed, SPEED_WINDOW)
+            && near(self.excited.mean(), machine.voltage, VOLTAGE_WINDOW)
     }
 }
 
@@ -64,6 +122,9 @@ pub(crate) struct Sisters {
     weight: f64,
     /// Part of this set's consumers that the bus bar feeds.
     coupled: f64,
+    /// kW and kvar of this set as it gave them last.
+    given: [f64; 2],
+    machine: Machine,
     offered: Offer,
     active: f64,
     reactive: f64,
@@ -79,6 +140,8 @@ impl Sisters {
             taken: [0.0; MOST as usize],
             weight: 0.0,
             coupled: 0.0,
+            given: [0.0; 2],
+            machine: Machine::default(),
             offered: Offer::default(),
             active: 0.0,
             reactive: 0.0,
@@ -102,9 +165,34 @@ impl Sisters {
         self.reactive
     }
 
-    /// What this set, with this voltage at its terminals, and its consumers are to the others.
-    pub(super) fn offer(&self, voltage: [f64; 3]) -> Offer {
-        Offer { voltage: if self.weight > 0.0 { voltage } else { [0.0; 3] }, ..self.offered }
+    /// Whether this set shares a bus bar with another one.
+    pub(crate) fn shares(&self) -> bool {
+        self.weight > 0.0 && self.sets() > 1.0
+    }
+
+    /// What this set, with this speed and voltage, and its consumers are to the others.
+    pub(super) fn offer(&self, speed: f64, volts: f64, terminals: [f64; 3]) -> Offer {
+        let on = self.weight > 0.0;
+        let holds = self.machine.active.is_none() && self.given[0] > 0.5 - MOTORING;
+        let runs_away = self.machine.active.is_some_and(|kw| kw > 0.0);
+        let excited = self.machine.reactive.is_none_or(|kvar| kvar > 0.0) && volts > alternator::DEAD;
+        Offer {
+            voltage: if on { terminals } else { [0.0; 3] },
+            governed: Sum::of(speed, on && holds),
+            runaway: Sum::of(speed, on && runs_away),
+            excited: Sum::of(volts, on && excited),
+            ..self.offered
+        }
+    }
+
+    /// Hears what the others are; rpm and V of the bus bar, where this set is on it with others and anybody has any.
+    pub(super) fn join(&mut self, own: Offer, others: Offer) -> (Option<f64>, Option<f64>) {
+        self.others = Some(others);
+        if self.weight > 0.0 && others.sets > 0.0 {
+            let all = own.and(others);
+            return (all.speed(), all.excited.mean());
+        }
+        (None, None)
     }
 
     /// V of each phase that the bus bar gives to consumers whose own set does not feed them.
@@ -118,39 +206,64 @@ impl Sisters {
         dt: f64,
         feeding: Feeding,
         load: PhaseLoads,
+        machine: Machine,
         random: &mut Random,
     ) -> PhaseLoads {
         let evenness = 1.0 + self.unevenness.step(dt, random);
+        self.machine = machine;
         self.come_and_go(dt, feeding);
         let others = self.others.unwrap_or_default();
         let own = self.weight * evenness;
-        let mine = own + self.taken.iter().sum::<f64>();
-        let whole = mine + others.weight;
-        let part = if whole > 0.0 { own / whole } else { 0.0 };
-
+        let imagined = self.taken.iter().sum::<f64>();
         let apart = if feeding == Feeding::Genset { 1.0 - self.coupled } else { 0.0 };
-        let times = |phases: [f64; 3], factor: f64| phases.map(|phase| phase * factor);
-        let pool = |own: [f64; 3], others: [f64; 3]| -> [f64; 3] {
-            std::array::from_fn(|phase| self.coupled * own[phase] + others[phase])
-        };
-        let pools = (pool(load.0, others.load.0), pool(load.1, others.load.1));
-        let share = |own: [f64; 3], pool: [f64; 3]| -> [f64; 3] {
-            std::array::from_fn(|phase| tenth(apart * own[phase] + part * pool[phase]))
-        };
-        let shares = (share(load.0, pools.0), share(load.1, pools.1));
-        let rest = |own: [f64; 3], pool: [f64; 3], share: [f64; 3]| {
-            tenth(apart * own.iter().sum::<f64>() + pool.iter().sum::<f64>() - share.iter().sum::<f64>())
-        };
-        self.active = rest(load.0, pools.0, shares.0);
-        self.reactive = rest(load.1, pools.1, shares.1);
-        let imagined = self.taken.iter().filter(|taken| **taken > 0.0).count() as f64;
+        // Somebody else must turn it, give it a field and take the rest.
+        let (turned, excited) = (others.weights[0] + others.runaway.1 > 0.0, others.excited.1 > 0.0);
+        let forced = [
+            machine.active.filter(|_| self.weight > 0.0 && turned),
+            machine.reactive.filter(|_| self.weight > 0.0 && excited),
+        ];
+        let (mut weights, mut gives, mut left) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        let mut shares = [[0.0; 3]; 2];
+        for (n, (own_load, others_load)) in
+            [(load.0, others.load.0), (load.1, others.load.1)].into_iter().enumerate()
+        {
+            let pool: [f64; 3] =
+                std::array::from_fn(|phase| self.coupled * own_load[phase] + others_load[phase]);
+            let wanted = pool.iter().sum::<f64>() - others.forced[n];
+            let whole = own + imagined + others.weights[n];
+            let part = match forced[n] {
+                Some(most) => {
+                    // No more than the others can be made to take.
+                    let room = if n == 0 { wanted + MOTORING * (imagined + others.weights[n]) } else { most };
+                    approach(&mut self.given[n], most.min(room), FOLLOWING, dt);
+                    gives[n] = self.given[n];
+                    weights[n] = imagined;
+                    [gives[n] / 3.0; 3]
+                }
+                None => {
+                    let part = if whole > 0.0 { own / whole } else { 0.0 };
+                    weights[n] = own + imagined;
+                    pool.map(|phase| part * (phase - others.forced[n] / 3.0))
+                }
+            };
+            shares[n] = std::array::from_fn(|phase| tenth(apart * own_load[phase] + part[phase]));
+            self.given[n] = if forced[n].is_some() { gives[n] } else { part.iter().sum() };
+            if whole > 0.0 {
+                let all = apart * own_load.iter().sum::<f64>() + pool.iter().sum::<f64>();
+                left[n] = tenth(all - shares[n].iter().sum::<f64>());
+            }
+        }
+        [self.active, self.reactive] = left;
+        let times = |phases: [f64; 3]| phases.map(|phase| phase * self.coupled);
+        let sisters = self.taken.iter().filter(|taken| **taken > 0.0).count() as f64;
         self.offered = Offer {
-            weight: mine,
-            sets: imagined + f64::from(u8::from(self.weight > 0.0)),
-            load: (times(load.0, self.coupled), times(load.1, self.coupled)),
-            voltage: [0.0; 3],
+            weights,
+            forced: gives,
+            sets: sisters + f64::from(u8::from(self.weight > 0.0)),
+            load: (times(load.0), times(load.1)),
+            ..Offer::default()
         };
-        shares
+        (shares[0], shares[1])
     }
 
     fn come_and_go(&mut self, dt: f64, feeding: Feeding) {
@@ -162,11 +275,12 @@ impl Sisters {
                 false => *taken = 0.0,
             }
         }
-        let live = self.others.is_some_and(|others| others.weight > 0.0);
+        let live = self.others.is_some_and(|others| others.sets > 0.0);
+        let in_step = self.others.is_none_or(|others| self.weight > 0.0 || others.meets(&self.machine));
         match (feeds, live) {
             (false, _) => self.weight = 0.0,
             (true, false) => self.weight = 1.0,
-            (true, true) if self.feeding >= APART => approach(&mut self.weight, 1.0, TAKING, dt),
+            (true, true) if self.feeding >= APART && in_step => approach(&mut self.weight, 1.0, TAKING, dt),
             (true, true) => {}
         }
         self.coupled = match feeding {
@@ -194,12 +308,13 @@ mod tests {
     use super::*;
 
     const LOAD: PhaseLoads = ([20.0; 3], [10.0; 3]);
+    const SOUND: Machine = Machine { speed: 1500.0, voltage: 230.0, active: None, reactive: None };
 
     fn run(sisters: &mut Sisters, feeding: Feeding, seconds: f64) -> f64 {
         let mut random = Random::new(2);
         let mut own = 0.0;
         for _ in 0..(seconds * 10.0) as u32 {
-            own = sisters.share(0.1, feeding, LOAD, &mut random).0.iter().sum();
+            own = sisters.share(0.1, feeding, LOAD, SOUND, &mut random).0.iter().sum();
         }
         own
     }
@@ -225,13 +340,27 @@ mod tests {
 
     /// Lets several sets live on one bus bar; what each carries in the end.
     fn together(sets: &mut [Sisters], feeding: &[Feeding], seconds: f64) -> Vec<f64> {
-        let mut carried = vec![0.0; sets.len()];
+        let machines = vec![SOUND; sets.len()];
+        let carried = with_machines(sets, feeding, &machines, seconds);
+        carried.into_iter().map(|[kw, _]| kw).collect()
+    }
+
+    /// The same of gensets that may be sick: kW and kvar.
+    fn with_machines(
+        sets: &mut [Sisters],
+        feeding: &[Feeding],
+        machines: &[Machine],
+        seconds: f64,
+    ) -> Vec<[f64; 2]> {
+        let mut random = Random::new(2);
+        let mut carried = vec![[0.0; 2]; sets.len()];
         for _ in 0..(seconds * 10.0) as u32 {
-            let offers: Vec<_> = sets.iter().map(|set| set.offer([230.0; 3])).collect();
+            let offers: Vec<_> = sets.iter().map(|set| set.offer(1500.0, 230.0, [230.0; 3])).collect();
             for (index, set) in sets.iter_mut().enumerate() {
                 let others = offers.iter().enumerate().filter(|(other, _)| *other != index);
-                set.others = Some(others.fold(Offer::default(), |sum, (_, offer)| sum.and(*offer)));
-                carried[index] = run(set, feeding[index], 0.1);
+                set.join(offers[index], others.fold(Offer::default(), |sum, (_, offer)| sum.and(*offer)));
+                let (active, reactive) = set.share(0.1, feeding[index], LOAD, machines[index], &mut random);
+                carried[index] = [active.iter().sum(), reactive.iter().sum()];
             }
         }
         carried
@@ -259,5 +388,64 @@ mod tests {
         assert!((carried[0] + carried[2] - 120.0).abs() < 1.0, "its mains feed them: {carried:?}");
         together(&mut sets, &[Nobody; 3], 1.0);
         assert!(sets.iter().all(|set| set.fed() == [0.0; 3] && set.active() == 0.0), "the bar is dead");
+    }
+
+    #[test]
+    fn what_a_sick_set_gives_the_others_do_not_and_all_of_it_adds_up() {
+        use Feeding::Genset;
+        for (sick, gives) in [
+            (Machine { active: Some(-MOTORING), ..SOUND }, [-MOTORING, 30.0]),
+            (Machine { active: Some(104.0), ..SOUND }, [104.0, 30.0]),
+            (Machine { reactive: Some(-42.0), ..SOUND }, [60.0, -42.0]),
+            (Machine { reactive: Some(90.0), ..SOUND }, [60.0, 90.0]),
+            (Machine { active: Some(-MOTORING), reactive: Some(-42.0), ..SOUND }, [-MOTORING, -42.0]),
+        ] {
+            let mut sets: Vec<_> = (0..3).map(|seed| Sisters::new(&mut Random::new(seed))).collect();
+            together(&mut sets, &[Genset; 3], 20.0);
+            let carried = with_machines(&mut sets, &[Genset; 3], &[SOUND, sick, SOUND], 10.0);
+            let sum = |n: usize| carried.iter().map(|set| set[n]).sum::<f64>();
+            assert!((sum(0) - 180.0).abs() < 1.0 && (sum(1) - 90.0).abs() < 1.0, "{carried:?}");
+            assert!((0..2).all(|n| (carried[1][n] - gives[n]).abs() < 3.0), "{sick:?} {carried:?}");
+            assert!((carried[0][0] - carried[2][0]).abs() < 3.0, "{carried:?}");
+        }
+    }
+
+    #[test]
+    fn one_that_runs_away_turns_all_once_no_governor_is_left_to_hold_it() {
+        use Feeding::Genset;
+        let runaway = Machine { speed: 1520.0, active: Some(104.0), ..SOUND };
+        let mut sets: Vec<_> = (0..2).map(|seed| Sisters::new(&mut Random::new(seed))).collect();
+        together(&mut sets, &[Genset; 2], 20.0);
+        let speed = |sets: &[Sisters]| {
+            let [sound, sick] =
+                [(0, 1500.0), (1, 1520.0)].map(|(n, rpm)| sets[n].offer(rpm, 230.0, [230.0; 3]));
+            sound.and(sick).speed()
+        };
+        with_machines(&mut sets, &[Genset; 2], &[SOUND, runaway], 0.3);
+        assert_eq!(speed(&sets), Some(1500.0), "the other one still gives way");
+        // 120 kW are wanted: of 104 the other one can hold the speed, of 300 it cannot.
+        with_machines(&mut sets, &[Genset; 2], &[SOUND, runaway], 10.0);
+        assert_eq!(speed(&sets), Some(1500.0));
+        let carried = with_machines(
+            &mut sets,
+            &[Genset, Genset],
+            &[SOUND, Machine { active: Some(300.0), ..runaway }],
+            10.0,
+        );
+        assert!((carried[0][0] + MOTORING).abs() < 0.5, "{carried:?}");
+        assert!((carried.iter().map(|set| set[0]).sum::<f64>() - 120.0).abs() < 0.5, "{carried:?}");
+        assert_eq!(speed(&sets), Some(1520.0));
+    }
+
+    #[test]
+    fn one_that_is_too_far_away_is_not_brought_in_step() {
+        use Feeding::Genset;
+        let far = Machine { voltage: 275.0, ..SOUND };
+        let mut sets: Vec<_> = (0..2).map(|seed| Sisters::new(&mut Random::new(seed))).collect();
+        together(&mut sets, &[Genset, Feeding::Nobody], 5.0);
+        let carried = with_machines(&mut sets, &[Genset; 2], &[SOUND, far], 20.0);
+        assert!(carried[0][0] == 60.0 && carried[1][0] == 60.0 && !sets[1].shares(), "{carried:?}");
+        with_machines(&mut sets, &[Genset; 2], &[SOUND; 2], 20.0);
+        assert!(sets.iter().all(Sisters::shares));
     }
 }

@@ -13,7 +13,7 @@ use super::tcp;
 use crate::error::StartError;
 
 /// What stands for a new pseudo-terminal where a device path could stand.
-const NEW_PTY: &str = "pty";
+pub(crate) const NEW_PTY: &str = "pty";
 
 /// Bound, and nobody served yet.
 #[derive(Debug)]

@@ -9,7 +9,7 @@ use crate::MAX_SPEED;
 /// A clock that was held up (a sleeping laptop, a debugger) does not make up for more than this.
 const MOST_LAPSE: Duration = Duration::from_secs(2);
 
-/// So much simulated time passes at once: clients wait no longer than that takes.
+/// So much simulated time of one plant passes at once: clients wait no longer than that takes.
 pub(super) const STRIDE: Duration = Duration::from_secs(10);
 
 /// How a simulated clock runs.

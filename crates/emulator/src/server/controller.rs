@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use busbar_link::Endpoint;
 
-use super::clock::{Pace, STRIDE, SpeedError};
+use super::clock::{Pace, SpeedError};
 use super::door::Served;
 use super::group::Group;
 use crate::device::Device;
@@ -49,13 +49,14 @@ impl Controller {
     }
 
     /// Lets so much simulated time pass now, whether its clock runs or not. An hour is some work; other tasks of the
-    /// thread wait for it.
+    /// thread wait for it, those of other threads do not.
     pub fn step(&self, by: Duration) {
         let mut left = by;
         while !left.is_zero() {
-            let stride = left.min(STRIDE);
+            let stride = left.min(self.group.stride());
             self.group.live(|clock| clock.step(stride));
             left -= stride;
+            self.group.give_way();
         }
     }
 }

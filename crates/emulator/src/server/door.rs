@@ -9,6 +9,7 @@ use busbar_modbus::stream::Frame;
 use busbar_modbus::{ExceptionCode, Framing, Losses, Request, Response, mbap, rtu};
 use tokio::sync::{Semaphore, watch};
 
+use super::shared::Shared;
 use crate::device::Device;
 use crate::faults::{Faults, Mischief, Struck};
 
@@ -44,19 +45,27 @@ impl std::ops::AddAssign for Statistics {
 /// A device that several endpoints may share.
 #[derive(Debug)]
 pub(super) struct Served {
-    device: Mutex<Device>,
+    device: Shared<Device>,
     /// Tells when the device restarts, which drops the connections of its own Ethernet port.
     pub(super) restarts: watch::Sender<()>,
 }
 
 impl Served {
     pub(super) fn new(device: Device) -> Self {
-        Self { device: Mutex::new(device), restarts: watch::Sender::new(()) }
+        Self { device: Shared::new(device), restarts: watch::Sender::new(()) }
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Device> {
-        // A panel that panicked would have been caught half-way; registers are still registers.
-        self.device.lock().unwrap_or_else(PoisonError::into_inner)
+        self.device.lock()
+    }
+
+    /// For whoever lets its time pass.
+    pub(super) fn hold(&self) -> MutexGuard<'_, Device> {
+        self.device.hold()
+    }
+
+    pub(super) fn is_wanted(&self) -> bool {
+        self.device.is_wanted()
     }
 }
 
@@ -130,26 +139,34 @@ impl Door {
             return None;
         }
         self.statistics().requests += 1;
-        let device = device.as_mut()?;
+        let now = match &device {
+            Some(device) => device.time(),
+            None if self.mischief.is_none() => return None,
+            // Adapters echo and converters refuse what nobody answers, too.
+            None => self.devices.first().map_or(Duration::ZERO, |(_, served)| served.lock().time()),
+        };
         let mut mischief = self.mischief();
-        let struck = mischief.as_mut().and_then(|mischief| mischief.strike(frame, device.time()));
+        let struck = mischief.as_mut().and_then(|mischief| mischief.strike(frame, now));
         let start = out.len();
-        if struck.is_none_or(Struck::is_heard) {
-            let response = device.answer(frame.unit, &request)?;
-            if !encode(framing, frame, &response, out) {
-                return None;
-            }
+        let mut outcome = Outcome {
+            delay: struck.map_or(Duration::ZERO, Struck::delay),
+            restarting: false,
+            hangs_up: struck.is_some_and(Struck::hangs_up),
+        };
+        if let Some(device) = device.as_mut().filter(|_| struck.is_none_or(Struck::is_heard)) {
+            let response = device.answer(frame.unit, &request);
+            let obeyed = response.is_some_and(|response| encode(framing, frame, &response, out));
+            outcome.delay += device.answer_delay();
+            outcome.restarting = obeyed && device.is_silent();
+        }
+        if struck.is_none() && out.len() == start {
+            return None;
         }
         if let Some(mischief) = &mut mischief {
             mischief.spoil(struck, framing, frame, out, start);
         }
-        let late = struck.map_or(Duration::ZERO, Struck::delay);
         self.statistics().answers += u64::from(out.len() > start);
-        Some(Outcome {
-            delay: device.answer_delay() + late,
-            restarting: device.is_silent(),
-            hangs_up: struck.is_some_and(Struck::hangs_up),
-        })
+        Some(outcome)
     }
 
     fn mischief(&self) -> Option<MutexGuard<'_, Mischief>> {
@@ -201,4 +218,35 @@ fn encode(framing: Framing, frame: &Frame<'_>, response: &Response<'_>, out: &mu
 
 pub(super) fn dropped(losses: &Losses) -> u64 {
     losses.garbage_bytes + losses.crc_errors + losses.wrong_protocol
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    /// What comes of a request to a unit that nobody has.
+    fn answer_to_nobody(kind: &str) -> Option<Vec<u8>> {
+        let faults = (!kind.is_empty()).then(|| {
+            let text = format!("[[faults]]\nkind = {kind}\nevery = 1\n");
+            Faults::parse("f.toml", &text).unwrap_or_else(|findings| panic!("{findings}"))
+        });
+        let served = Arc::new(Served::new(Device::new(&Config::default()).unwrap()));
+        let endpoint = "rtu+tcp://127.0.0.1:0".parse().unwrap();
+        let places = Arc::new(Semaphore::new(1));
+        let door = Door::new(endpoint, vec![(1, served)], places, Duration::ZERO, faults.as_ref());
+        let frame = Frame { transaction: 0, unit: 9, pdu: &[6, 0x20, 1, 0, 8] };
+        let mut out = Vec::new();
+        door.answer(&frame, &mut out).map(|_| out)
+    }
+
+    #[test]
+    fn a_line_can_be_sick_where_nobody_answers() {
+        assert_eq!(answer_to_nobody(""), None);
+        for silent in ["\"unanswered\"", "\"garbled\"", "\"twice\"", "\"other_unit\"", "\"cut\""] {
+            assert_eq!(answer_to_nobody(silent), Some(Vec::new()), "{silent}");
+        }
+        assert_eq!(answer_to_nobody("\"echo\""), Some(vec![9, 6, 0x20, 1, 0, 8, 0xD3, 0x44]));
+        assert_eq!(answer_to_nobody("\"exception\"\ncode = 11"), Some(vec![9, 0x86, 11, 0x82, 0x65]));
+    }
 }

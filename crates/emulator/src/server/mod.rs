@@ -8,6 +8,7 @@ mod group;
 mod line;
 mod pty;
 mod serial;
+mod shared;
 mod tcp;
 
 #[cfg(test)]
@@ -25,8 +26,9 @@ use crate::config::Config;
 use crate::device::{Device, STEP};
 use crate::error::StartError;
 use crate::fleet::{Fleet, Joint};
+pub(crate) use bind::NEW_PTY;
 use bind::Socket;
-use clock::{Clock, STRIDE};
+use clock::Clock;
 pub use clock::{Pace, SpeedError};
 pub use controller::Controller;
 pub use door::Statistics;
@@ -277,7 +279,7 @@ async fn tick(group: Arc<Group>) {
         let mut due = group.clock().due(now.duration_since(last));
         last = now;
         while !due.is_zero() && now.elapsed() < MOST_WORK {
-            let stride = due.min(STRIDE);
+            let stride = due.min(group.stride());
             group.live(|clock| clock.run(stride));
             due -= stride;
             yield_now().await;

@@ -162,6 +162,75 @@ async fn three_units_share_a_bus_bar_and_carry_the_consumers_of_one_that_trips()
 }
 
 #[tokio::test]
+async fn whoever_looks_while_an_hour_is_stepped_is_let_in() {
+    let site = Site::new("bus-bar.toml").await;
+    let [first, second] = [0, 1].map(|index| site.emulation.controllers()[index].clone());
+    let start = second.with(|device| device.time());
+    let end = start + Duration::from_secs(3600);
+    let stepping = std::thread::spawn(move || first.step(Duration::from_secs(3600)));
+    let mut seen = Vec::new();
+    while !stepping.is_finished() {
+        seen.push(second.with(|device| device.time()));
+    }
+    stepping.join().unwrap();
+    assert_eq!(second.with(|device| device.time()), end);
+    seen.dedup();
+    assert!(seen.len() > 100, "{}", seen.len());
+}
+
+/// Three units that share a bus bar.
+async fn on_one_bar() -> Site {
+    let site = Site::new("bus-bar.toml").await;
+    site.pull(3, "grid", "failed");
+    for genset in 0..3 {
+        site.seconds_until(genset, "breaker.genset.closed", "yes");
+    }
+    site.pass(30);
+    site
+}
+
+#[tokio::test]
+async fn whatever_is_on_one_bus_bar_has_one_frequency_and_one_voltage() {
+    for (lever, to) in
+        [("governor", "normal"), ("governor", "hunting"), ("avr", "high"), ("fuel.supply", "shut")]
+    {
+        let site = on_one_bar().await;
+        site.pull(1, lever, to);
+        for _ in 0..60 {
+            site.emulation.controllers()[0].step(Duration::from_millis(100));
+            if site.facts(0..3, "breaker.genset.closed") != ["yes", "yes", "yes"] {
+                break;
+            }
+            let hertz = site.facts(0..3, "genset.frequency");
+            assert!(hertz.iter().all(|other| *other == hertz[0]), "{lever} {hertz:?}");
+            let volts = [0, 1, 2].map(|genset| site.number(genset, "genset.l1.voltage"));
+            assert!(volts.iter().all(|other| (other - volts[0]).abs() < 1.0), "{lever} {volts:?}");
+            let all: f64 = carried(&site).iter().sum();
+            // What one lets go the others take a step later.
+            assert!((78.0..102.0).contains(&all), "{lever} {all}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_set_that_the_others_turn_or_excite_is_thrown_off_the_bus_bar() {
+    for (lever, to, alarm) in [
+        ("fuel.supply", "shut", "load_dump_alarms.reverse_power"),
+        ("avr", "failed", "load_dump_alarms.excitation_lost"),
+    ] {
+        let site = on_one_bar().await;
+        site.pull(1, lever, to);
+        let seconds = site.seconds_until(1, "breaker.genset.closed", "no");
+        assert!(seconds < 15, "{lever}: {seconds} s");
+        assert_eq!(site.fact(1, alarm), "yes", "{lever}");
+        site.pass(5);
+        assert_eq!(site.facts(0..3, "breaker.genset.closed"), ["yes", "no", "yes"]);
+        let [first, second, third] = carried(&site);
+        assert!(second == 0.0 && (88.0..92.0).contains(&(first + third)), "{first} {third}");
+    }
+}
+
+#[tokio::test]
 async fn joined_controllers_have_one_clock_and_the_same_run_every_time() {
     let runs = [Site::new("bus-bar.toml").await, Site::new("bus-bar.toml").await];
     for site in &runs {
@@ -211,7 +280,7 @@ fn what_is_wrong_with_a_file_is_said_with_its_line_and_a_remedy() {
         (HEAD.to_owned() + &GENSET.replace("\"w\"", "\"x\""), 9, "there is no wire `x`"),
         (HEAD.to_owned() + &GENSET.replace("\"a\"", "\"A b\""), 7, "`A b` is no id"),
         (format!("{HEAD}{GENSET}unit = 0\n"), 10, "unit 0 is not possible"),
-        (format!("{HEAD}{GENSET}unit = 3000000000\n"), 10, "unit 0 is not possible"),
+        (format!("{HEAD}{GENSET}unit = 3000000000\n"), 10, "unit 3000000000 is not possible"),
         (format!("{HEAD}{GENSET}unit = \"1\"\n"), 10, "`unit` has the wrong type"),
         (format!("{HEAD}{GENSET}model = \"D-900\"\n"), 10, "`D-900` is not a model"),
         (format!("{HEAD}{GENSET}seed = -1\n"), 10, "`seed` is -1"),
@@ -237,12 +306,42 @@ fn what_is_wrong_with_a_file_is_said_with_its_line_and_a_remedy() {
         (with("[[bus_bars]]\ngensets = [\"a\", \"a\"]\n"), 16, "`a` is on a bus bar already"),
         (with("[[bus_bars]]\ngensets = [\"a\", \"s\"]\n"), 16, "`s` is no genset"),
         (with("[[bus_bars]]\n"), 15, "`gensets` is missing in [[bus_bars]]"),
+        (format!("{HEAD}{GENSET}unit = 241\n"), 10, "unit 241 is not possible"),
+        (
+            format!("{HEAD}[[wires]]\nid = \"v\"\nendpoint = \"tcp://127.0.0.1:0\"\n{GENSET}"),
+            6,
+            "nobody is on wire `v`",
+        ),
+        (
+            format!("{HEAD}[[wires]]\nid = \"v\"\nendpoint = \"rtu+tcp://127.0.0.1:0\"\n{GENSET}")
+                .replace(":0", ":9"),
+            8,
+            "another wire has this endpoint",
+        ),
         (with("[[tie]]\n"), 15, "unknown key `tie` in a fleet file"),
     ] {
         let findings = Fleet::parse("f.toml", &text).err().unwrap_or_else(|| panic!("accepted: {text}"));
         let said = findings.to_string();
         let there = said.lines().any(|said| said.contains(&format!("f.toml:{line}:")) && said.contains(says));
         assert!(there, "line {line}, {says}:\n{said}\n{text}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_said_once_and_where_it_stands() {
+    let supply = "[[supplies]]\nfrom = \"s\"\nsection = 1\nto = \"a\"\n";
+    let many: String = (0..300)
+        .map(|n| GENSET.replace("\"a\"", &format!("\"a{n}\"")) + &format!("unit = {}\n", n % 200 + 1))
+        .collect();
+    for (text, says) in [
+        (format!("{HEAD}{GENSET}unit = 0\n{SWITCH}{supply}"), "unit 0 is not possible"),
+        (HEAD.replace("tcp:", "http:") + GENSET + SWITCH + supply, "unknown scheme"),
+        (format!("{HEAD}{GENSET}{SWITCH}[[bus_bars]]\ngensets = 3\n"), "`gensets` has the wrong type"),
+        (format!("{HEAD}{many}[[bus_bars]]\ngensets = [\"a1\", \"a299\"]\n"), "more than 100 controllers"),
+    ] {
+        let said = Fleet::parse("f.toml", &text).unwrap_err().to_string();
+        assert_eq!(said.matches("f.toml:").count(), 1, "{said}");
+        assert!(said.contains(says), "{said}");
     }
 }
 
