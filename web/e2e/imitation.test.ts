@@ -152,24 +152,25 @@ test('by keyboard alone the clock is stopped, stepped, and goes on', async () =>
   await page.close()
 })
 
+// No story pulls a lever of this genset.
 test('everything goes back to normal at one word, by keyboard, and whoever is there stays there', async () => {
-  const page = await open(imitation('switch-1'))
+  const page = await open(imitation('genset-1'))
   const at = () => page.evaluate(() => document.activeElement?.textContent)
   const pulled = page.getByRole('list', { name: 'What is pulled' })
   const key = async (name: string) => {
     await page.getByRole('button', { name, exact: true }).focus()
     await page.keyboard.press('Enter')
   }
-  await key('Fail source 1')
-  await pulled.getByText('Mains of source 1: failed').waitFor()
-  await expect.poll(at).toBe('Give source 1 back')
-  await key('Jam the bus tie')
+  await key('Fail the mains')
+  await pulled.getByText('Mains: failed').waitFor()
+  await expect.poll(at).toBe('Give the mains back')
+  await key('Jam the genset breaker')
   await pulled.getByText('will not close').waitFor()
   await page.getByLabel('Alarm', { exact: true }).fill('overload')
   await press(page, 'Inject')
-  await pulled.getByText('(warning): injected').waitFor()
+  await pulled.getByText('(load dump): injected').waitFor()
   expect(await pulled.getByRole('listitem').count()).toBe(3)
-  await key('Put Mains of source 1 back')
+  await key('Put Mains back')
   await expect.poll(() => pulled.getByRole('listitem').count()).toBe(2)
   await expect.poll(at).toBe('Put back')
   await key('All back to normal')
