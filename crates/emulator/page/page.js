@@ -34,7 +34,15 @@ const STATES = {
   'state.src2': 'Source 2',
   mode: 'Mode',
 }
-const BREAKERS = { mains: 'Mains breaker', genset: 'Genset breaker', src1: 'QS1', src2: 'QS2', tie: 'QTIE' }
+const BREAKERS = {
+  mains: 'Mains breaker',
+  genset: 'Genset breaker',
+  busbar: 'Busbar breaker',
+  load: 'Load breaker',
+  src1: 'QS1',
+  src2: 'QS2',
+  tie: 'QTIE',
+}
 
 const $ = (id) => document.getElementById(id)
 /** Belongs to the controller that is shown now; another one begins anew. */
