@@ -108,6 +108,29 @@ impl Offer {
     }
 }
 
+/// What this set and its consumers want, of active or of reactive power.
+struct Wish {
+    /// Shares that it takes.
+    own: f64,
+    /// Part of its consumers that it feeds alone.
+    apart: f64,
+    /// kW or kvar of each phase of its consumers.
+    load: [f64; 3],
+    /// What it gives whatever is wanted of it.
+    forced: Option<f64>,
+}
+
+/// What comes of it.
+struct Portion {
+    /// kW or kvar of each phase that this set carries.
+    share: [f64; 3],
+    /// What the others carry.
+    left: f64,
+    /// Shares that it and the imagined ones take, and what it gives without one.
+    weight: f64,
+    forced: f64,
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Sisters {
     /// How many imagined ones are to run with this set.
@@ -214,56 +237,57 @@ impl Sisters {
         self.come_and_go(dt, feeding);
         let others = self.others.unwrap_or_default();
         let own = self.weight * evenness;
-        let imagined = self.taken.iter().sum::<f64>();
         let apart = if feeding == Feeding::Genset { 1.0 - self.coupled } else { 0.0 };
         // Somebody else must turn it, give it a field and take the rest.
         let (turned, excited) = (others.weights[0] + others.runaway.1 > 0.0, others.excited.1 > 0.0);
-        let forced = [
-            machine.active.filter(|_| self.weight > 0.0 && turned),
-            machine.reactive.filter(|_| self.weight > 0.0 && excited),
+        let forced = |given: Option<f64>, possible: bool| given.filter(|_| self.weight > 0.0 && possible);
+        let wishes = [
+            Wish { own, apart, load: load.0, forced: forced(machine.active, turned) },
+            Wish { own, apart, load: load.1, forced: forced(machine.reactive, excited) },
         ];
-        let (mut weights, mut gives, mut left) = ([0.0; 2], [0.0; 2], [0.0; 2]);
-        let mut shares = [[0.0; 3]; 2];
-        for (n, (own_load, others_load)) in
-            [(load.0, others.load.0), (load.1, others.load.1)].into_iter().enumerate()
-        {
-            let pool: [f64; 3] =
-                std::array::from_fn(|phase| self.coupled * own_load[phase] + others_load[phase]);
-            let wanted = pool.iter().sum::<f64>() - others.forced[n];
-            let whole = own + imagined + others.weights[n];
-            let part = match forced[n] {
-                Some(most) => {
-                    // No more than the others can be made to take.
-                    let room = if n == 0 { wanted + MOTORING * (imagined + others.weights[n]) } else { most };
-                    approach(&mut self.given[n], most.min(room), FOLLOWING, dt);
-                    gives[n] = self.given[n];
-                    weights[n] = imagined;
-                    [gives[n] / 3.0; 3]
-                }
-                None => {
-                    let part = if whole > 0.0 { own / whole } else { 0.0 };
-                    weights[n] = own + imagined;
-                    pool.map(|phase| part * (phase - others.forced[n] / 3.0))
-                }
-            };
-            shares[n] = std::array::from_fn(|phase| tenth(apart * own_load[phase] + part[phase]));
-            self.given[n] = if forced[n].is_some() { gives[n] } else { part.iter().sum() };
-            if whole > 0.0 {
-                let all = apart * own_load.iter().sum::<f64>() + pool.iter().sum::<f64>();
-                left[n] = tenth(all - shares[n].iter().sum::<f64>());
-            }
-        }
-        [self.active, self.reactive] = left;
+        let [active, reactive] = [0, 1].map(|n| self.portion(dt, n, &wishes[n], &others));
+        [self.active, self.reactive] = [active.left, reactive.left];
         let times = |phases: [f64; 3]| phases.map(|phase| phase * self.coupled);
         let sisters = self.taken.iter().filter(|taken| **taken > 0.0).count() as f64;
         self.offered = Offer {
-            weights,
-            forced: gives,
+            weights: [active.weight, reactive.weight],
+            forced: [active.forced, reactive.forced],
             sets: sisters + f64::from(u8::from(self.weight > 0.0)),
             load: (times(load.0), times(load.1)),
             ..Offer::default()
         };
-        (shares[0], shares[1])
+        (active.share, reactive.share)
+    }
+
+    /// What becomes of active power (0) or reactive power (1).
+    fn portion(&mut self, dt: f64, n: usize, wish: &Wish, others: &Offer) -> Portion {
+        let theirs = if n == 0 { others.load.0 } else { others.load.1 };
+        let pool: [f64; 3] = std::array::from_fn(|phase| self.coupled * wish.load[phase] + theirs[phase]);
+        let wanted = pool.iter().sum::<f64>();
+        let beside = self.taken.iter().sum::<f64>() + others.weights[n];
+        let whole = wish.own + beside;
+        let (part, weight) = match wish.forced {
+            Some(most) => {
+                // No more than the others can be made to take.
+                let room = if n == 0 { wanted - others.forced[n] + MOTORING * beside } else { most };
+                approach(&mut self.given[n], most.min(room), FOLLOWING, dt);
+                ([self.given[n] / 3.0; 3], 0.0)
+            }
+            None => {
+                let part = if whole > 0.0 { wish.own / whole } else { 0.0 };
+                let part = pool.map(|phase| part * (phase - others.forced[n] / 3.0));
+                self.given[n] = part.iter().sum();
+                (part, wish.own)
+            }
+        };
+        let share = std::array::from_fn(|phase| tenth(wish.apart * wish.load[phase] + part[phase]));
+        let all = wish.apart * wish.load.iter().sum::<f64>() + wanted;
+        Portion {
+            share,
+            left: if whole > 0.0 { tenth(all - share.iter().sum::<f64>()) } else { 0.0 },
+            weight: weight + self.taken.iter().sum::<f64>(),
+            forced: if wish.forced.is_some() { self.given[n] } else { 0.0 },
+        }
     }
 
     fn come_and_go(&mut self, dt: f64, feeding: Feeding) {
