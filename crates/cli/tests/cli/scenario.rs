@@ -94,8 +94,8 @@ fn a_wrong_file_is_a_wrong_call() {
         .mentions("did you mean `command`?")
         .mentions("a.toml:10:25: `state.engine` is never `crank`");
     let other = "[scenario]\ntitle = \"Air\"\ncontroller = \"smartgen-acc1700\"\n[[steps]]\nat = \"1s\"\ncommand = \"start\"\n";
-    play(other, "").refuses().says(
-        "the scenario \"Air\" is for smartgen-acc1700, not for datakom-d; imitate smartgen-acc1700, or choose another one",
+    play(other, "").refuses().says_in_one_sentence(
+        "a.toml:3:14: this scenario is for smartgen-acc1700, not for datakom-d; imitate smartgen-acc1700, or choose another one",
     );
     busbar("emulate datakom-d --listen tcp://127.0.0.1:0 --scenario /no/such/file.toml")
         .refuses()
