@@ -122,7 +122,8 @@ fn feed_is_lawful(feed: &Feed, closed: bool) -> Result<(), TestCaseError> {
         prop_assert!((s * s - p * p - q * q).abs() < 1e-6, "{feed:?}");
         prop_assert!((feed.voltage[phase] * current[phase] / 1000.0 - s).abs() < 1e-6, "{feed:?}");
         prop_assert!((0.0..450.0).contains(&feed.voltage[phase]), "{feed:?}");
-        prop_assert!(p.abs() < 250.0 && q.abs() < 250.0, "{feed:?}");
+        // Two sources in opposition draw up to 220 kvar, and the worst of loads 115 beside.
+        prop_assert!(p.abs() < 250.0 && q.abs() < 340.0, "{feed:?}");
         prop_assert!(closed || (p, q) == (0.0, 0.0), "an open breaker carries nothing: {feed:?}");
     }
     let (p, q) = (feed.total_active(), feed.total_reactive());
