@@ -161,6 +161,20 @@ fn offers(lever: &Lever) -> String {
 }
 
 #[cfg(test)]
+impl Lever {
+    /// A position by how far into its words and numbers it is, 0 to 1.
+    pub(crate) fn at(&self, part: f64) -> Position {
+        let kinds = self.words.len() + usize::from(self.numbers.is_some());
+        let place = part * kinds as f64;
+        match (self.words.get(place as usize), self.numbers) {
+            (Some(word), _) => Position::Word(word.id),
+            (None, Some(range)) => Position::Number(range.min + place.fract() * (range.max - range.min)),
+            (None, None) => unreachable!("a lever has words or numbers"),
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -3,8 +3,6 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use crate::levers::Position;
-
 use super::super::{COMPRESSOR_LEVERS, Compressor, Feed, HERTZ_PER_RPM, Orders};
 use super::*;
 
@@ -41,17 +39,6 @@ fn events(levers: usize) -> impl Strategy<Value = Vec<Event>> {
     prop::collection::vec(event, 1..40)
 }
 
-/// A position of a lever by how far into its words and numbers it is.
-fn position(lever: &Lever, part: f64) -> Position {
-    let kinds = lever.words.len() + usize::from(lever.numbers.is_some());
-    let place = part * kinds as f64;
-    match (lever.words.get(place as usize), lever.numbers) {
-        (Some(word), _) => Position::Word(word.id),
-        (None, Some(range)) => Position::Number(range.min + place.fract() * (range.max - range.min)),
-        (None, None) => unreachable!("a lever has words or numbers"),
-    }
-}
-
 fn fixed() -> ProptestConfig {
     ProptestConfig {
         cases: 64,
@@ -63,7 +50,7 @@ fn fixed() -> ProptestConfig {
 
 fn happen(plant: &mut Plant, controls: &mut Controls, what: &Happening) {
     match what {
-        Happening::Lever(number, part) => plant.pull(LEVERS[*number].id, position(&LEVERS[*number], *part)),
+        Happening::Lever(number, part) => plant.pull(LEVERS[*number].id, LEVERS[*number].at(*part)),
         Happening::Outputs(bits) => *controls = outputs(*bits),
         Happening::Trim([rpm, volts, rpm_droop, volt_droop]) => {
             (plant.engine.governor.trim, plant.engine.governor.droop) = (*rpm, *rpm_droop);
@@ -272,7 +259,7 @@ fn happen_to_air(plant: &mut Compressor, orders: &mut Orders, what: &Happening) 
     match what {
         Happening::Lever(number, part) => {
             let lever = &COMPRESSOR_LEVERS[*number];
-            plant.pull(lever.id, position(lever, *part));
+            plant.pull(lever.id, lever.at(*part));
         }
         Happening::Outputs(bits) => {
             let on = |bit: u8| bits >> bit & 1 == 1;

@@ -44,17 +44,6 @@ fn commands() -> impl Strategy<Value = Happening> {
     prop_oneof![prop::sample::select(all.to_vec()), transfers].prop_map(Happening::Command)
 }
 
-/// A position of a lever by how far into its words and numbers it is.
-fn position(lever: &Lever, part: f64) -> Position {
-    let kinds = lever.words.len() + usize::from(lever.numbers.is_some());
-    let place = part * kinds as f64;
-    match (lever.words.get(place as usize), lever.numbers) {
-        (Some(word), _) => Position::Word(word.id),
-        (None, Some(range)) => Position::Number(range.min + place.fract() * (range.max - range.min)),
-        (None, None) => unreachable!("a lever has words or numbers"),
-    }
-}
-
 fn outputs_of(drives: [u8; 3], bits: u8) -> Outputs {
     let on = |bit: u8| bits >> bit & 1 == 1;
     Outputs {
@@ -132,7 +121,7 @@ proptest! {
             match what {
                 Happening::Lever(number, part) => {
                     let lever = &LEVERS[number];
-                    unit.pull(lever.id, position(lever, part));
+                    unit.pull(lever.id, lever.at(part));
                 }
                 Happening::Outputs(drives, bits) => outputs = outputs_of(drives, bits),
                 Happening::Command(_) => {}
@@ -169,7 +158,7 @@ proptest! {
                     let befalls = grid || lever.id.starts_with("genset") || lever.id.starts_with("input");
                     let faults = lever.id.starts_with("short_circuit");
                     if !(faults || befalls && unit.sequence.loops()) {
-                        unit.pull(lever.id, position(lever, part));
+                        unit.pull(lever.id, lever.at(part));
                     }
                 }
                 Happening::Command(coil) => unit.write_coil(coil, steps % 2 == 0),
